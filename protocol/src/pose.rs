@@ -1,0 +1,203 @@
+//! Device poses, on their way in: `PLPS`, 96 bytes, or the same as JSON.
+//!
+//! Both forms pass the same gate ([`Pose::checked`]): finite numbers, a position within [`MAX_POSITION_M`], an
+//! orientation of unit length within [`UNIT_TOLERANCE`], which is then normalised.
+
+use serde::{Deserialize, Serialize};
+
+use crate::DecodeError;
+use crate::bytes::{Layout, finite, open_exact};
+
+/// First bytes of a pose.
+pub const MAGIC: [u8; 4] = *b"PLPS";
+/// Length of a binary pose in bytes.
+pub const BYTES: usize = 96;
+/// Largest accepted distance from the origin in metres.
+pub const MAX_POSITION_M: f64 = 1e3;
+/// How far the length of an orientation may be from 1.
+pub const UNIT_TOLERANCE: f64 = 1e-2;
+
+const FLAG_VALID: u32 = 1;
+
+/// Where a tracker says that a tool is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// Rises by one or more with each pose of a source; 0 means that the source does not number its poses.
+    pub sequence: u64,
+    /// When the pose was measured, on the source's own clock, in nanoseconds; 0 means unknown.
+    pub source_time_ns: u64,
+    /// Drawn at random when a publisher starts; order is judged within one source.
+    pub source_id: u32,
+    /// False while the tracker does not see the tool.
+    pub valid: bool,
+    /// Position in the tracker's frame, in metres.
+    pub position_m: [f64; 3],
+    /// Unit quaternion `x y z w`.
+    pub orientation_xyzw: [f64; 4],
+    /// One bit per button.
+    pub buttons: u32,
+    /// Analogue grip, 0 open to 1 closed by convention.
+    pub grip: f32,
+}
+
+impl Default for Pose {
+    fn default() -> Self {
+        Self {
+            sequence: 0,
+            source_time_ns: 0,
+            source_id: 0,
+            valid: true,
+            position_m: [0.0; 3],
+            orientation_xyzw: [0.0, 0.0, 0.0, 1.0],
+            buttons: 0,
+            grip: 0.0,
+        }
+    }
+}
+
+impl Pose {
+    /// The 96 bytes of the wire, as they are (the gate is the reader's).
+    pub fn encode(&self) -> [u8; BYTES] {
+        Layout::new(MAGIC)
+            .u64(self.sequence)
+            .u64(self.source_time_ns)
+            .u32(self.source_id)
+            .u32(if self.valid { FLAG_VALID } else { 0 })
+            .f64s(self.position_m)
+            .f64s(self.orientation_xyzw)
+            .u32(self.buttons)
+            .f32(self.grip)
+            .finish()
+    }
+
+    /// Reads 96 bytes and passes them through the gate. Unknown flag bits are ignored.
+    pub fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
+        let mut fields = open_exact(bytes, MAGIC, BYTES)?;
+        Self {
+            sequence: fields.u64(),
+            source_time_ns: fields.u64(),
+            source_id: fields.u32(),
+            valid: fields.u32() & FLAG_VALID != 0,
+            position_m: fields.f64s(),
+            orientation_xyzw: fields.f64s(),
+            buttons: fields.u32(),
+            grip: fields.f32(),
+        }
+        .checked()
+    }
+
+    /// Reads the JSON form and passes it through the gate.
+    pub fn decode_json(bytes: &[u8]) -> Result<Self, DecodeError> {
+        let json: JsonPose =
+            serde_json::from_slice(bytes).map_err(|error| DecodeError::Json(error.to_string()))?;
+        json.to_pose()
+    }
+
+    /// The JSON form, all fields written.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string(&JsonPose::from(self)).expect("numbers always serialise")
+    }
+
+    /// The gate: the same pose with a normalised orientation, or why it is refused.
+    ///
+    /// ```text
+    /// q <- q / |q|   if | |q| - 1 | <= 1e-2
+    /// ```
+    /// A quaternion that is already unit to rounding keeps its bits, so that the gate applied twice changes nothing.
+    pub fn checked(mut self) -> Result<Self, DecodeError> {
+        finite("position", &self.position_m)?;
+        finite("orientation", &self.orientation_xyzw)?;
+        finite("grip", &[f64::from(self.grip)])?;
+        let distance_m = norm(&self.position_m);
+        if distance_m > MAX_POSITION_M {
+            return Err(DecodeError::OutOfRange {
+                field: "position",
+                value: distance_m,
+                limit: MAX_POSITION_M,
+            });
+        }
+        self.orientation_xyzw = normalised(self.orientation_xyzw)?;
+        Ok(self)
+    }
+}
+
+fn norm(values: &[f64]) -> f64 {
+    values.iter().map(|value| value * value).sum::<f64>().sqrt()
+}
+
+fn normalised(q: [f64; 4]) -> Result<[f64; 4], DecodeError> {
+    let norm = norm(&q);
+    if (norm - 1.0).abs() > UNIT_TOLERANCE {
+        return Err(DecodeError::NotUnit { norm });
+    }
+    let unit_to_rounding = (norm - 1.0).abs() <= 4.0 * f64::EPSILON;
+    Ok(if unit_to_rounding {
+        q
+    } else {
+        q.map(|component| component / norm)
+    })
+}
+
+/// The JSON form of a pose; only `position` and `orientation` are required.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JsonPose {
+    /// See [`Pose::sequence`].
+    #[serde(default)]
+    pub sequence: u64,
+    /// See [`Pose::source_time_ns`].
+    #[serde(default)]
+    pub source_time_ns: u64,
+    /// See [`Pose::source_id`].
+    #[serde(default)]
+    pub source_id: u32,
+    /// See [`Pose::valid`]; true if left out.
+    #[serde(default = "yes")]
+    pub valid: bool,
+    /// Position in metres.
+    pub position: [f64; 3],
+    /// Quaternion `x y z w`.
+    pub orientation: [f64; 4],
+    /// See [`Pose::buttons`].
+    #[serde(default)]
+    pub buttons: u32,
+    /// See [`Pose::grip`].
+    #[serde(default)]
+    pub grip: f32,
+}
+
+pub(crate) fn yes() -> bool {
+    true
+}
+
+impl JsonPose {
+    /// The pose, passed through the gate.
+    pub fn to_pose(&self) -> Result<Pose, DecodeError> {
+        Pose {
+            sequence: self.sequence,
+            source_time_ns: self.source_time_ns,
+            source_id: self.source_id,
+            valid: self.valid,
+            position_m: self.position,
+            orientation_xyzw: self.orientation,
+            buttons: self.buttons,
+            grip: self.grip,
+        }
+        .checked()
+    }
+}
+
+impl From<&Pose> for JsonPose {
+    fn from(pose: &Pose) -> Self {
+        Self {
+            sequence: pose.sequence,
+            source_time_ns: pose.source_time_ns,
+            source_id: pose.source_id,
+            valid: pose.valid,
+            position: pose.position_m,
+            orientation: pose.orientation_xyzw,
+            buttons: pose.buttons,
+            grip: pose.grip,
+        }
+    }
+}

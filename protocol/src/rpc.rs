@@ -1,0 +1,314 @@
+//! Methods under `rpc/<method>`: JSON in, JSON out.
+//!
+//! An empty payload is read as `{}`. Unknown keys are errors, so that a typing mistake is not a silent default.
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use crate::DecodeError;
+use crate::pose::{JsonPose, Pose, yes};
+
+/// Most ticks that one `step` may ask for; they must pass within a client's time-out.
+pub const MAX_STEP_TICKS: u32 = 10_000;
+
+/// What a daemon can be asked to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Method {
+    /// Rest state, tick 0, tools unplaced, pose order forgotten. Request `{}`, reply [`StateReply`].
+    Reset,
+    /// Stops the clock of the simulation. Request `{}`, reply [`StateReply`].
+    Pause,
+    /// Starts the clock again. Request `{}`, reply [`StateReply`].
+    Resume,
+    /// Runs ticks while paused. Request [`StepRequest`], reply [`StepReply`].
+    Step,
+    /// Keeps the present state. Request `{}`, reply [`SnapshotReply`].
+    Snapshot,
+    /// Returns to a kept state. Request [`RestoreRequest`], reply [`StateReply`].
+    Restore,
+}
+
+impl Method {
+    /// All methods.
+    pub const ALL: [Self; 6] = [
+        Self::Reset,
+        Self::Pause,
+        Self::Resume,
+        Self::Step,
+        Self::Snapshot,
+        Self::Restore,
+    ];
+
+    /// The last part of the key.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Reset => "reset",
+            Self::Pause => "pause",
+            Self::Resume => "resume",
+            Self::Step => "step",
+            Self::Snapshot => "snapshot",
+            Self::Restore => "restore",
+        }
+    }
+
+    /// The method of that name. Errors with `rpc_unknown`.
+    pub fn parse(name: &str) -> Result<Self, ErrorReply> {
+        Self::ALL
+            .into_iter()
+            .find(|method| method.name() == name)
+            .ok_or_else(|| {
+                let known = Self::ALL.map(Self::name).join(", ");
+                ErrorReply::new(
+                    ErrorCode::RpcUnknown,
+                    format!("no method `{name}`; there are {known}"),
+                )
+            })
+    }
+}
+
+/// Reads a request. Errors with `rpc_malformed`.
+pub fn decode_request<T: DeserializeOwned>(payload: &[u8]) -> Result<T, ErrorReply> {
+    let payload = if payload.is_empty() { b"{}" } else { payload };
+    serde_json::from_slice(payload)
+        .map_err(|error| ErrorReply::new(ErrorCode::RpcMalformed, error.to_string()))
+}
+
+/// `{}`: a method without arguments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EmptyRequest {}
+
+/// Lock-step: the poses are applied first, in order, then the ticks run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StepRequest {
+    /// How many ticks, 0 to [`MAX_STEP_TICKS`].
+    pub ticks: u32,
+    /// Poses to apply before the first tick.
+    #[serde(default)]
+    pub poses: Vec<StepPose>,
+}
+
+/// A pose and the tool that it is for: `{"tool": name, ...}` with the keys of the JSON pose.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StepPose {
+    /// Name of the tool.
+    pub tool: String,
+    /// See [`Pose::sequence`].
+    #[serde(default)]
+    pub sequence: u64,
+    /// See [`Pose::source_time_ns`].
+    #[serde(default)]
+    pub source_time_ns: u64,
+    /// See [`Pose::source_id`].
+    #[serde(default)]
+    pub source_id: u32,
+    /// See [`Pose::valid`]; true if left out.
+    #[serde(default = "yes")]
+    pub valid: bool,
+    /// Position in metres.
+    pub position: [f64; 3],
+    /// Quaternion `x y z w`.
+    pub orientation: [f64; 4],
+    /// See [`Pose::buttons`].
+    #[serde(default)]
+    pub buttons: u32,
+    /// See [`Pose::grip`].
+    #[serde(default)]
+    pub grip: f32,
+}
+
+impl StepPose {
+    /// A pose for a tool.
+    pub fn new(tool: &str, pose: &Pose) -> Self {
+        let JsonPose {
+            sequence,
+            source_time_ns,
+            source_id,
+            valid,
+            position,
+            orientation,
+            buttons,
+            grip,
+        } = pose.into();
+        let tool = tool.to_owned();
+        Self {
+            tool,
+            sequence,
+            source_time_ns,
+            source_id,
+            valid,
+            position,
+            orientation,
+            buttons,
+            grip,
+        }
+    }
+
+    /// The pose, passed through the gate of [`Pose::checked`].
+    pub fn to_pose(&self) -> Result<Pose, DecodeError> {
+        let Self {
+            sequence,
+            source_time_ns,
+            source_id,
+            valid,
+            position,
+            orientation,
+            buttons,
+            grip,
+            ..
+        } = *self;
+        JsonPose {
+            sequence,
+            source_time_ns,
+            source_id,
+            valid,
+            position,
+            orientation,
+            buttons,
+            grip,
+        }
+        .to_pose()
+    }
+}
+
+/// Asks for a kept state.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RestoreRequest {
+    /// What `snapshot` returned.
+    pub id: String,
+}
+
+/// Where the simulation stands after `reset`, `pause`, `resume` or `restore`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct StateReply {
+    /// Ticks since reset.
+    pub tick: u64,
+    /// Simulated time in seconds.
+    pub sim_time_s: f64,
+    /// Whether the simulation's clock stands.
+    pub paused: bool,
+}
+
+/// Where the simulation stands after `step`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct StepReply {
+    /// Ticks since reset.
+    pub tick: u64,
+    /// Simulated time in seconds.
+    pub sim_time_s: f64,
+}
+
+/// Names a kept state.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SnapshotReply {
+    /// What `restore` takes.
+    pub id: String,
+}
+
+/// What went wrong, in place of a reply.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ErrorReply {
+    /// One of [`ErrorCode::name`]; a reader must expect codes that it does not know.
+    pub code: String,
+    /// A sentence for a person.
+    pub message: String,
+    /// True if the same request may succeed later.
+    pub retryable: bool,
+}
+
+impl ErrorReply {
+    /// An error of a known code.
+    pub fn new(code: ErrorCode, message: impl Into<String>) -> Self {
+        Self {
+            code: code.name().to_owned(),
+            message: message.into(),
+            retryable: code.retryable(),
+        }
+    }
+
+    /// The payload of the reply.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string(self).expect("strings always serialise")
+    }
+}
+
+/// The codes that this version of the protocol has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ErrorCode {
+    /// No such method.
+    RpcUnknown,
+    /// A method asked for through a wildcard.
+    RpcWildcard,
+    /// Not JSON, an unknown or missing key, or a value out of range.
+    RpcMalformed,
+    /// `step` while the simulation's clock runs.
+    NotPaused,
+    /// A pose inside a request did not pass the gate, or is out of order.
+    BadPose,
+    /// A tool that the scene does not have.
+    UnknownTool,
+    /// An object that the scene does not have.
+    UnknownObject,
+    /// A snapshot that does not exist (any more).
+    UnknownSnapshot,
+    /// `?offset=` is no number or beyond the end.
+    BadOffset,
+    /// Nothing to answer with yet, for instance no frame.
+    NotReady,
+    /// The queue of requests is full.
+    Busy,
+    /// The simulation did not answer in time.
+    TimedOut,
+    /// The daemon is stopping.
+    ShuttingDown,
+    /// A fault of the daemon.
+    Internal,
+}
+
+impl ErrorCode {
+    /// All codes.
+    pub const ALL: [Self; 14] = [
+        Self::RpcUnknown,
+        Self::RpcWildcard,
+        Self::RpcMalformed,
+        Self::NotPaused,
+        Self::BadPose,
+        Self::UnknownTool,
+        Self::UnknownObject,
+        Self::UnknownSnapshot,
+        Self::BadOffset,
+        Self::NotReady,
+        Self::Busy,
+        Self::TimedOut,
+        Self::ShuttingDown,
+        Self::Internal,
+    ];
+
+    /// The `code` of the reply, also the counter in the status.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::RpcUnknown => "rpc_unknown",
+            Self::RpcWildcard => "rpc_wildcard",
+            Self::RpcMalformed => "rpc_malformed",
+            Self::NotPaused => "not_paused",
+            Self::BadPose => "bad_pose",
+            Self::UnknownTool => "unknown_tool",
+            Self::UnknownObject => "unknown_object",
+            Self::UnknownSnapshot => "unknown_snapshot",
+            Self::BadOffset => "bad_offset",
+            Self::NotReady => "not_ready",
+            Self::Busy => "busy",
+            Self::TimedOut => "timed_out",
+            Self::ShuttingDown => "shutting_down",
+            Self::Internal => "internal",
+        }
+    }
+
+    /// True if the same request may succeed later.
+    pub fn retryable(self) -> bool {
+        matches!(self, Self::NotReady | Self::Busy | Self::TimedOut)
+    }
+}
