@@ -1,1 +1,24 @@
-//! stub
+//! Meshes of Plica and what depends on nothing but them: hexahedral meshes, the generated shapes of the
+//! scenes, triangle skins and their clusters, embedding weights, mesh files.
+//!
+//! Everything is `f64` in SI units (metres), right-handed, z up. This crate knows no physics, no bus and no clock.
+
+mod clusters;
+mod embedding;
+pub mod export;
+mod hex_mesh;
+mod index;
+pub mod isoparametric;
+mod locate;
+mod neighbourhood;
+pub mod shapes;
+mod skin;
+
+pub use clusters::CLUSTER_SIZE;
+pub use embedding::{
+    DEFAULT_SUPPORT_CELLS, Embedding, EmbeddingError, EmbeddingKind, MAX_OUTSIDE_CELLS,
+};
+pub use hex_mesh::{HEX_FACES, HexMesh, MeshError};
+pub use index::{HexIdx, NodeIdx, TriangleIdx, VertexIdx};
+pub use locate::{Location, locate};
+pub use skin::{Skin, SkinError};

@@ -1,0 +1,42 @@
+//! Mesh files: GLB for viewers, VTU for analysis.
+
+mod glb;
+mod vtu;
+
+pub use glb::{glb_bytes, write_glb};
+pub use vtu::{PointField, write_vtu};
+
+use std::path::{Path, PathBuf};
+
+/// Why a mesh file was not written.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The file cannot be created or written.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// A field does not hold one value per node.
+    #[error("point field `{name}` holds {n_values} values for {n_nodes} nodes")]
+    FieldLength {
+        /// The field.
+        name: String,
+        /// Its number of values.
+        n_values: usize,
+        /// Number of nodes.
+        n_nodes: usize,
+    },
+    /// The VTK writer refused the data.
+    #[error("cannot encode VTU: {0}")]
+    Vtk(String),
+}
+
+fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
+    std::fs::write(path, bytes).map_err(|source| ExportError::Write {
+        path: path.to_owned(),
+        source,
+    })
+}
