@@ -66,9 +66,11 @@ fn one_byte_too_many() {
     assert_eq!(kind(SkinFrame::decode(&longer(&a_skin()))), "bad_length");
 }
 
+type Decode = fn(&[u8]) -> &'static str;
+
 #[test]
 fn every_bit_of_the_first_eight_bytes_counts() {
-    let messages: [(Vec<u8>, fn(&[u8]) -> &'static str); 3] = [
+    let messages: [(Vec<u8>, Decode); 3] = [
         (Pose::default().encode().to_vec(), |bytes| {
             kind(Pose::decode(bytes))
         }),
