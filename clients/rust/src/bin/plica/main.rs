@@ -1,0 +1,2 @@
+//! The `plica` command.
+fn main() {}

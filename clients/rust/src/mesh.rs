@@ -1,0 +1,31 @@
+//! What a client needs from the mesh reply: rest positions in world coordinates.
+
+use thiserror::Error;
+
+/// A GLB that is not the protocol's mesh.
+#[derive(Debug, Error)]
+pub enum MeshError {
+    /// Not a GLB file.
+    #[error("not a GLB: {0}")]
+    Gltf(#[from] Box<gltf::Error>),
+    /// It has no triangles with positions.
+    #[error("the GLB has no mesh with positions")]
+    Empty,
+}
+
+/// Rest positions `[n][3]` in metres, world frame (z up), in the order of the skin frames.
+///
+/// The root node of the GLB turns them to glTF's y up; its transform is not applied here.
+pub fn rest_positions(glb: &[u8]) -> Result<Vec<[f32; 3]>, MeshError> {
+    let gltf = gltf::Gltf::from_slice(glb).map_err(Box::new)?;
+    let primitive = gltf
+        .meshes()
+        .flat_map(|mesh| mesh.primitives())
+        .next()
+        .ok_or(MeshError::Empty)?;
+    let positions = primitive
+        .reader(|_| gltf.blob.as_deref())
+        .read_positions()
+        .ok_or(MeshError::Empty)?;
+    Ok(positions.collect())
+}

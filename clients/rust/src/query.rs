@@ -1,0 +1,207 @@
+//! Questions to the daemon: status, methods, meshes, the present skin.
+
+use std::time::Duration;
+
+use plica_protocol::chunk::ChunkHeader;
+use plica_protocol::keys::check_name;
+use plica_protocol::rpc::{ErrorReply, StepPose, StepReply, StepRequest};
+use plica_protocol::status::Status;
+use plica_protocol::{DecodeError, ENCODING_JSON};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+use zenoh::Wait;
+use zenoh::bytes::Encoding;
+use zenoh::query::{Reply, ReplyError};
+use zenoh::sample::Sample;
+
+use crate::{Client, ClientError, SkinMessage};
+
+/// Zenoh reports its own time-out as an error reply; this much later nothing comes any more.
+const GRACE: Duration = Duration::from_millis(500);
+/// Refuses a length that no mesh or snapshot has.
+const MAX_WHOLE_BYTES: u64 = 1 << 31;
+
+impl Client {
+    /// What the daemon says about itself.
+    pub fn status(&self) -> Result<Status, ClientError> {
+        let key = self.keys.status();
+        let reply = self.ask(&key, None)?;
+        parse_json(&key, &reply.payload().to_bytes())
+    }
+
+    /// The same as it was sent, with keys that this version does not know.
+    pub fn status_json(&self) -> Result<Value, ClientError> {
+        let key = self.keys.status();
+        let reply = self.ask(&key, None)?;
+        parse_json(&key, &reply.payload().to_bytes())
+    }
+
+    /// Calls a method with JSON arguments; the daemon's error replies become [`ClientError::Refused`].
+    pub fn rpc(&self, method: &str, arguments: &Value) -> Result<Value, ClientError> {
+        self.call(method, arguments)
+    }
+
+    /// Calls a method with typed arguments and a typed reply (see `protocol::rpc`).
+    pub fn call<Q: Serialize, R: DeserializeOwned>(
+        &self,
+        method: &str,
+        request: &Q,
+    ) -> Result<R, ClientError> {
+        check_name(method)?;
+        let key = self.keys.rpc(method);
+        let json =
+            serde_json::to_vec(request).map_err(|error| ClientError::Bus(error.to_string()))?;
+        let reply = self.ask(&key, Some(json))?;
+        parse_json(&key, &reply.payload().to_bytes())
+    }
+
+    /// Lock-step: applies the poses, then runs the ticks. The daemon must be paused.
+    pub fn step(&self, ticks: u32, poses: Vec<StepPose>) -> Result<StepReply, ClientError> {
+        self.call("step", &StepRequest { ticks, poses })
+    }
+
+    /// The mesh of an object as GLB: fetched in pieces, its SHA-256 checked.
+    pub fn mesh(&self, object: &str) -> Result<Vec<u8>, ClientError> {
+        check_name(object)?;
+        self.fetch_whole(&self.keys.mesh(object))
+    }
+
+    /// The newest frame of an object.
+    pub fn skin_now(&self, object: &str) -> Result<SkinMessage, ClientError> {
+        check_name(object)?;
+        let key = self.keys.skin(object);
+        let reply = self.ask(&key, None)?;
+        let message = SkinMessage::decode(reply.payload().to_bytes().into_owned());
+        message.map_err(|source| ClientError::Malformed { key, source })
+    }
+
+    fn fetch_whole(&self, key: &str) -> Result<Vec<u8>, ClientError> {
+        let mut whole: Vec<u8> = Vec::new();
+        let mut announced: Option<ChunkHeader> = None;
+        loop {
+            let reply = self.ask(&format!("{key}?offset={}", whole.len()), None)?;
+            let piece = reply.payload().to_bytes();
+            let header = chunk_header(key, &reply)?;
+            if announced
+                .as_ref()
+                .is_some_and(|first| first.sha256 != header.sha256)
+            {
+                // It was replaced on the way: start again.
+                whole.clear();
+                announced = None;
+                continue;
+            }
+            check_piece(key, &header, whole.len(), piece.len())?;
+            whole.extend_from_slice(&piece);
+            if whole.len() as u64 == header.total_bytes {
+                return check_sum(key, &header, whole);
+            }
+            announced = Some(header);
+        }
+    }
+
+    /// The first reply to a query.
+    fn ask(&self, selector: &str, payload: Option<Vec<u8>>) -> Result<Sample, ClientError> {
+        let query = self.session.get(selector).timeout(self.timeout);
+        let query = match payload {
+            Some(json) => query.payload(json).encoding(Encoding::from(ENCODING_JSON)),
+            None => query,
+        };
+        let replies = query.wait().map_err(ClientError::bus)?;
+        match replies.recv_timeout(self.timeout + GRACE) {
+            Ok(Some(reply)) => self.accept(selector, reply),
+            Ok(None) => Err(self.timed_out(selector)),
+            Err(_) => Err(ClientError::NoAnswer {
+                place: self.place.clone(),
+                key: key_of(selector),
+            }),
+        }
+    }
+
+    fn accept(&self, selector: &str, reply: Reply) -> Result<Sample, ClientError> {
+        reply
+            .into_result()
+            .map_err(|error| self.refusal(selector, &error))
+    }
+
+    fn refusal(&self, selector: &str, error: &ReplyError) -> ClientError {
+        let payload = error.payload().to_bytes();
+        match serde_json::from_slice::<ErrorReply>(&payload) {
+            Ok(refused) => ClientError::Refused(refused),
+            Err(_) if &*payload == b"Timeout" => self.timed_out(selector),
+            Err(_) => ClientError::Bus(String::from_utf8_lossy(&payload).into_owned()),
+        }
+    }
+
+    fn timed_out(&self, selector: &str) -> ClientError {
+        ClientError::TimedOut {
+            key: key_of(selector),
+            timeout: self.timeout,
+        }
+    }
+}
+
+fn key_of(selector: &str) -> String {
+    selector.split('?').next().unwrap_or_default().to_owned()
+}
+
+fn parse_json<T: DeserializeOwned>(key: &str, bytes: &[u8]) -> Result<T, ClientError> {
+    let malformed = |error: serde_json::Error| DecodeError::Json(error.to_string());
+    serde_json::from_slice(bytes)
+        .map_err(malformed)
+        .map_err(|source| ClientError::Malformed {
+            key: key.to_owned(),
+            source,
+        })
+}
+
+fn chunk_header(key: &str, reply: &Sample) -> Result<ChunkHeader, ClientError> {
+    let attachment = reply
+        .attachment()
+        .map(|bytes| bytes.to_bytes().into_owned())
+        .unwrap_or_default();
+    ChunkHeader::from_json(&attachment).map_err(|source| ClientError::Malformed {
+        key: key.to_owned(),
+        source,
+    })
+}
+
+fn check_piece(
+    key: &str,
+    header: &ChunkHeader,
+    have: usize,
+    got: usize,
+) -> Result<(), ClientError> {
+    let left = header.total_bytes.saturating_sub(have as u64);
+    let starts_there = header.offset == have as u64;
+    let fits = (1..=left.max(1)).contains(&(got as u64)) || header.total_bytes == 0;
+    if starts_there && fits && header.total_bytes <= MAX_WHOLE_BYTES {
+        return Ok(());
+    }
+    let source = DecodeError::Length {
+        expected: left,
+        got: got as u64,
+    };
+    Err(ClientError::Malformed {
+        key: key.to_owned(),
+        source,
+    })
+}
+
+fn check_sum(key: &str, header: &ChunkHeader, whole: Vec<u8>) -> Result<Vec<u8>, ClientError> {
+    let got: String = Sha256::digest(&whole)
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect();
+    if got == header.sha256 {
+        Ok(whole)
+    } else {
+        Err(ClientError::Checksum {
+            key: key.to_owned(),
+            expected: header.sha256.clone(),
+            got,
+        })
+    }
+}

@@ -1,0 +1,187 @@
+//! Streams on their way in. Callbacks decode, store and return; a panic in one would kill the link, so none escapes.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use plica_protocol::keys::check_name;
+use plica_protocol::skin::{SkinFrame, SkinHeader};
+use plica_protocol::wrench::Wrench;
+use plica_protocol::{DecodeError, ENCODING_JSON};
+use zenoh::Wait;
+use zenoh::bytes::Encoding;
+use zenoh::pubsub::Subscriber;
+use zenoh::sample::Sample;
+
+use crate::queue::{Overflow, Queue, StreamStats};
+use crate::{Client, ClientError};
+
+/// A skin frame as it arrived.
+#[derive(Debug, Clone)]
+pub struct SkinMessage {
+    /// Its header.
+    pub header: SkinHeader,
+    /// The whole message.
+    pub bytes: Vec<u8>,
+    /// When it arrived.
+    pub received: Instant,
+}
+
+impl SkinMessage {
+    /// The frame in the bytes; they have been checked.
+    pub fn frame(&self) -> Result<SkinFrame<'_>, DecodeError> {
+        SkinFrame::decode(&self.bytes)
+    }
+
+    pub(crate) fn decode(bytes: Vec<u8>) -> Result<Self, DecodeError> {
+        let header = SkinFrame::decode(&bytes)?.header;
+        Ok(Self {
+            header,
+            bytes,
+            received: Instant::now(),
+        })
+    }
+}
+
+/// A wrench and when it arrived.
+#[derive(Debug, Clone, Copy)]
+pub struct WrenchMessage {
+    /// The wrench.
+    pub wrench: Wrench,
+    /// When it arrived.
+    pub received: Instant,
+}
+
+/// A message that nobody has looked at.
+#[derive(Debug, Clone)]
+pub struct RawMessage {
+    /// The key that it was published on.
+    pub key: String,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+    /// Whether the sender marked it as JSON.
+    pub json: bool,
+    /// When it arrived.
+    pub received: Instant,
+}
+
+/// Messages that wait for their reader. Ends when dropped.
+pub struct Subscription<T> {
+    queue: Arc<Queue<T>>,
+    _subscribers: Vec<Subscriber<()>>,
+}
+
+impl<T> Subscription<T> {
+    /// The next message, waiting at most `timeout`.
+    pub fn next(&self, timeout: Duration) -> Option<T> {
+        self.queue.pop(timeout)
+    }
+
+    /// The next message if it is there.
+    pub fn try_next(&self) -> Option<T> {
+        self.queue.pop(Duration::ZERO)
+    }
+
+    /// Counters since the start.
+    pub fn stats(&self) -> StreamStats {
+        self.queue.stats()
+    }
+}
+
+impl Client {
+    /// Frames of an object; a slow reader gets the newest one and misses the others.
+    pub fn subscribe_skin(&self, object: &str) -> Result<Subscription<SkinMessage>, ClientError> {
+        check_name(object)?;
+        self.subscribe(
+            &[self.keys.skin(object)],
+            Queue::new(1, Overflow::DropOldest),
+            |sample| {
+                let message = SkinMessage::decode(sample.payload().to_bytes().into_owned())?;
+                let sequence = message.header.sequence;
+                Ok((message, Some(sequence)))
+            },
+        )
+    }
+
+    /// Wrenches of a tool, at most `capacity` of them waiting; further ones are dropped and counted.
+    pub fn subscribe_wrenches(
+        &self,
+        tool: &str,
+        capacity: usize,
+    ) -> Result<Subscription<WrenchMessage>, ClientError> {
+        check_name(tool)?;
+        self.subscribe(
+            &[self.keys.wrench(tool)],
+            Queue::new(capacity, Overflow::DropNewest),
+            |sample| {
+                let wrench = Wrench::decode(&sample.payload().to_bytes())?;
+                Ok((
+                    WrenchMessage {
+                        wrench,
+                        received: Instant::now(),
+                    },
+                    Some(wrench.sequence),
+                ))
+            },
+        )
+    }
+
+    /// Whatever is published on some key expressions, in order of arrival, at most `capacity` waiting.
+    pub fn subscribe_raw(
+        &self,
+        key_expressions: &[String],
+        capacity: usize,
+    ) -> Result<Subscription<RawMessage>, ClientError> {
+        let json = Encoding::from(ENCODING_JSON);
+        self.subscribe(
+            key_expressions,
+            Queue::new(capacity, Overflow::DropNewest),
+            move |sample| {
+                let message = RawMessage {
+                    key: sample.key_expr().as_str().to_owned(),
+                    bytes: sample.payload().to_bytes().into_owned(),
+                    json: *sample.encoding() == json,
+                    received: Instant::now(),
+                };
+                Ok((message, None))
+            },
+        )
+    }
+
+    fn subscribe<T: Send + 'static>(
+        &self,
+        key_expressions: &[String],
+        queue: Queue<T>,
+        decode: impl Fn(&Sample) -> Result<(T, Option<u64>), DecodeError>
+        + Clone
+        + Send
+        + Sync
+        + 'static,
+    ) -> Result<Subscription<T>, ClientError> {
+        let queue = Arc::new(queue);
+        let mut subscribers = Vec::new();
+        for key in key_expressions {
+            let (queue, decode) = (Arc::clone(&queue), decode.clone());
+            let store = move |sample: Sample| match decode(&sample) {
+                Ok((message, sequence)) => queue.push(message, sequence),
+                Err(_) => queue.count_malformed(),
+            };
+            let subscriber = self
+                .session
+                .declare_subscriber(key.clone())
+                .callback(guarded(store));
+            subscribers.push(subscriber.wait().map_err(ClientError::bus)?);
+        }
+        Ok(Subscription {
+            queue,
+            _subscribers: subscribers,
+        })
+    }
+}
+
+/// Keeps a panic from reaching Zenoh's receiving thread.
+fn guarded<T>(callback: impl Fn(T) + Send + Sync + 'static) -> impl Fn(T) + Send + Sync + 'static {
+    move |value| {
+        let _ = catch_unwind(AssertUnwindSafe(|| callback(value)));
+    }
+}
