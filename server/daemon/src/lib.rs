@@ -1,1 +1,2 @@
-//! stub
+//! plicad: the daemon.
+pub mod config;

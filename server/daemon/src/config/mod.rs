@@ -1,0 +1,130 @@
+//! Scene files: [`RawConfig`] is what was typed, [`Config`] is what is meant. Parsed and checked once; nothing checks again.
+
+mod bench;
+mod checks;
+mod document;
+mod error;
+mod obj;
+mod object;
+mod raw;
+mod runtime;
+mod tool;
+
+use std::path::{Path, PathBuf};
+
+use plica_sim::{ContactOptions, Plane, SleepOptions, ToolDescription};
+
+pub use bench::{BenchConfig, Keyframe};
+pub use document::Document;
+pub use error::ConfigError;
+pub use object::{Face, FixedConfig, MeshConfig, ObjectConfig, PositionFormat, PublishConfig, Region, SkinConfig};
+pub use raw::RawConfig;
+pub use runtime::RuntimeConfig;
+
+use checks::Check;
+
+/// The wedge that runs when no scene is named.
+pub const BUILT_IN_SCENE: &str = include_str!("../../../../configs/scenes/wedge.toml");
+
+/// A checked scene. SI units; every number is within the range that `plicad schema` names.
+#[derive(Debug, Clone)]
+pub struct Config {
+    name: String,
+    file: PathBuf,
+    object: ObjectConfig,
+    tools: Vec<ToolDescription>,
+    contact: ContactOptions,
+    runtime: RuntimeConfig,
+    bench: Option<BenchConfig>,
+}
+
+impl Config {
+    /// The built-in scene.
+    pub fn built_in() -> Result<Self, ConfigError> {
+        Self::parse(Path::new("wedge.toml"), BUILT_IN_SCENE)
+    }
+
+    /// Reads and checks a scene file.
+    pub fn from_file(file: &Path) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(file).map_err(|e| ConfigError {
+            file: file.to_owned(),
+            line: None,
+            key: String::new(),
+            problem: format!("cannot be read: {e}"),
+            advice: "check the path; `plicad serve` without a scene runs the built-in wedge".into(),
+        })?;
+        Self::parse(file, &text)
+    }
+
+    /// Checks the text of a scene file. `file` names it in messages and resolves relative paths.
+    pub fn parse(file: &Path, text: &str) -> Result<Self, ConfigError> {
+        let document = Document::parse(file, text)?;
+        let raw: RawConfig = document.read()?;
+        let check = Check::new(&document);
+        let object = object::check(&check, &raw.objects)?;
+        let tools = tool::check(&check, &raw.tools)?;
+        let bench = raw.bench.as_ref().map(|b| bench::check(&check, b, &tools)).transpose()?;
+        Ok(Self {
+            name: file.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned()),
+            file: file.to_owned(),
+            object,
+            contact: runtime::check_contact(&check, &raw.contact)?,
+            runtime: runtime::check(&check, &raw.runtime)?,
+            tools,
+            bench,
+        })
+    }
+
+    /// Name of the scene: the file's name without its ending.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// File that the scene was read from.
+    pub fn file(&self) -> &Path {
+        &self.file
+    }
+
+    /// The object.
+    pub fn object(&self) -> &ObjectConfig {
+        &self.object
+    }
+
+    /// Tools in alphabetical order of their names.
+    pub fn tools(&self) -> &[ToolDescription] {
+        &self.tools
+    }
+
+    /// Index of a tool by name.
+    pub fn tool_index(&self, name: &str) -> Option<usize> {
+        self.tools.iter().position(|t| t.name == name)
+    }
+
+    /// Contact detection and law.
+    pub fn contact(&self) -> &ContactOptions {
+        &self.contact
+    }
+
+    /// Time step, gravity, real-time thread.
+    pub fn runtime(&self) -> &RuntimeConfig {
+        &self.runtime
+    }
+
+    /// What `plicad bench` does with the tools.
+    pub fn bench(&self) -> Option<&BenchConfig> {
+        self.bench.as_ref()
+    }
+
+    /// Immovable half-spaces.
+    pub fn planes(&self) -> &[Plane] {
+        self.object.planes()
+    }
+
+    /// When the object sleeps.
+    pub fn sleep(&self) -> &SleepOptions {
+        self.runtime.sleep()
+    }
+}
+
+#[cfg(test)]
+mod tests;

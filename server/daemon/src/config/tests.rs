@@ -1,0 +1,110 @@
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::path::Path;
+
+use super::*;
+
+/// The built-in scene with `from` replaced by `to`; the message that comes out, and the line on which `to` stands.
+fn message_and_line(from: &str, to: &str) -> (String, usize) {
+    assert!(BUILT_IN_SCENE.contains(from), "`{from}` is not in the built-in scene");
+    let text = BUILT_IN_SCENE.replacen(from, to, 1);
+    let line = 1 + text[..text.find(to).unwrap()].matches('\n').count();
+    let error = Config::parse(Path::new("bad.toml"), &text).expect_err(to);
+    (error.to_string(), line)
+}
+
+#[test]
+fn the_built_in_scene_is_the_wedge_of_the_design() {
+    let config = Config::built_in().unwrap();
+    assert_eq!(config.name(), "wedge");
+    assert_eq!(config.object().mesh().extents_m(), [0.12, 0.06, 0.04]);
+    assert_eq!(config.object().material().young_modulus_pa, 3e4);
+    assert_eq!(config.object().divisions(), [8, 4, 4]);
+    assert_eq!(config.tools()[0].friction, 0.8);
+    assert_eq!(config.runtime().timestep_s(), 1e-3);
+}
+
+#[test]
+fn the_peer_wedge_reads() {
+    let text = include_str!("../../../../configs/scenes/peer-wedge.toml");
+    let config = Config::parse(Path::new("peer-wedge.toml"), text).unwrap();
+    assert_eq!(config.bench().unwrap().duration_s(), 1.0);
+}
+
+/// Each bad file gives one message that names file, line, key, what is allowed, and what to do.
+#[test]
+fn every_bad_file_gives_one_clear_message() {
+    let cases: &[(&str, &str, &[&str])] = &[
+        ("poisson_ratio = 0.45", "poisson_ratio = 0.7", &["material.poisson_ratio", "0.7", "0 to 0.499", "choose"]),
+        ("young_modulus_pa = 3e4", "young_modulus_pa = nan", &["young_modulus_pa", "10 to 1000000000"]),
+        ("young_modulus_pa = 3e4", "young_modulus_kpa = 30", &["unknown field `young_modulus_kpa`", "expected"]),
+        ("young_modulus_pa = 3e4", "young_modulus_pa = \"stiff\"", &["young_modulus_pa", "invalid type", "string"]),
+        ("length_m = 0.12 ", "length_m = -1.0 ", &["mesh.length_m", "0.001 to 10"]),
+        ("generator = \"wedge\" ", "generator = \"cone\" ", &["mesh.generator", "unknown variant `cone`", "wedge"]),
+        ("divisions = [8, 4, 4]", "divisions = [100, 100, 100]", &["coarse.divisions", "1000000", "1 to 20000"]),
+        ("divisions = [8, 4, 4]", "divisions = [8, 4]", &["coarse.divisions", "length"]),
+        ("faces = [\"z_min\"]", "faces = [\"bottom\"]", &["fixed", "unknown variant `bottom`", "z_min"]),
+        ("planes = []", "planes = [{ point_m = [0, 0, 0], normal = [0, 0, 0] }]", &["planes.0.normal", "floor"]),
+        ("spacing_m = 0.00189", "spacing_m = 0.00011", &["skin.spacing_m", "at most 300000"]),
+        ("publish_hz = 90.0", "publish_hz = 2000.0", &["publish.publish_hz", "1 to 1000"]),
+        ("format = \"f32\"", "format = \"f16\"", &["unknown variant `f16`", "`i16`"]),
+        ("friction = 0.8", "friction = 3.0", &["tools.probe.friction", "0 to 2"]),
+        ("coupling = \"spring\"", "coupling = \"rigid\"", &["has no meaning with coupling = \"rigid\"", "remove"]),
+        ("sampling = \"latest\" ", "sampling = \"interpolate\" ", &["tools.probe.delay_ms", "is missing", "add"]),
+        ("[0.0, 0.0, 0.0, 1.0] }\ntool_from", "[0.0, 0.0, 0.0, 2.0] }\ntool_from", &["rotation_xyzw", "0.99 to 1.01"]),
+        ("radius_m = 0.007", "radius_m = 0.0", &["tools.probe.shape.capsule.radius_m", "0.0005 to 0.5"]),
+        ("stale_after_ms = 200.0", "stale_after_s = 0.2", &["tools.probe.stale_after_s", "unknown field"]),
+        ("max_contacts = 32", "max_contacts = 0", &["contact.max_contacts", "1 to 256"]),
+        ("timestep_s = 0.001", "timestep_s = 1.0", &["runtime.timestep_s", "0.0001 to 0.02"]),
+        ("realtime_priority = 60", "realtime_priority = 100", &["runtime.realtime_priority", "0 to 99"]),
+        ("{ tool = \"probe\", time_s = 0.3", "{ tool = \"prob\", time_s = 0.3", &["motion.1.tool", "`prob`", "probe"]),
+        ("{ tool = \"probe\", time_s = 0.3", "{ tool = \"probe\", time_s = 0.7", &["time_s", "order"]),
+    ];
+    for (from, to, fragments) in cases {
+        let (message, line) = message_and_line(from, to);
+        assert!(message.starts_with("bad.toml:"), "{message}");
+        assert!(!message.contains('\n'), "one line: {message}");
+        for fragment in *fragments {
+            assert!(message.contains(fragment), "`{fragment}` is missing in: {message}");
+        }
+        let named: usize = message.split(':').nth(1).unwrap().parse().unwrap();
+        assert!((line.saturating_sub(20)..=line + 1).contains(&named), "line {line} expected: {message}");
+    }
+}
+
+#[test]
+fn the_line_of_a_range_error_is_exact() {
+    for (from, to) in [("poisson_ratio = 0.45", "poisson_ratio = 0.7"), ("timestep_s = 0.001", "timestep_s = 1.0")] {
+        let (message, line) = message_and_line(from, to);
+        assert!(message.starts_with(&format!("bad.toml:{line}: ")), "{line} expected: {message}");
+    }
+}
+
+#[test]
+fn a_second_object_is_refused() {
+    let second = BUILT_IN_SCENE.replace("objects.wedge", "objects.other");
+    let second = &second[..second.find("# --- The tools").unwrap()];
+    let error = Config::parse(Path::new("bad.toml"), &format!("{BUILT_IN_SCENE}\n{second}")).unwrap_err();
+    assert!(error.to_string().contains("exactly one object"), "{error}");
+}
+
+#[test]
+fn text_that_is_not_toml_names_its_line() {
+    let error = Config::parse(Path::new("bad.toml"), "[objects.wedge\nmesh = 1\n").unwrap_err();
+    assert!(error.to_string().starts_with("bad.toml:1: not valid TOML"), "{error}");
+}
+
+#[test]
+fn a_missing_file_says_so() {
+    let error = Config::from_file(Path::new("no-such.toml")).unwrap_err();
+    assert!(error.to_string().starts_with("no-such.toml: cannot be read"), "{error}");
+}
+
+#[test]
+fn bench_motion_is_piecewise_linear() {
+    let config = Config::built_in().unwrap();
+    let at = |t| config.bench().unwrap().pose(0, t).unwrap().translation.vector;
+    assert_eq!(at(-1.0), at(0.0));
+    assert_eq!(at(9.0), at(1.0));
+    assert!((at(0.15).z - 0.5 * (0.037 + 0.0285)).abs() < 1e-12);
+}

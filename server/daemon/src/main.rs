@@ -1,0 +1,2 @@
+//! plicad
+fn main() {}
