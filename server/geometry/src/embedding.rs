@@ -83,7 +83,7 @@ pub struct Embedding {
 impl Embedding {
     /// Weights of every point of `points` \[m\] in `mesh`.
     ///
-    /// Moving least squares [KMBG09]: with `d_a` the distance along the mesh (see below), `h` the support radius,
+    /// Moving least squares \[KMBG09\]: with `d_a` the distance along the mesh (see below), `h` the support radius,
     /// `y_a = (x_a - x) / h` and `p(y) = (1, y)`,
     ///
     /// `phi_a(x) = w(d_a / h) p(0)^T M(x)^-1 p(y_a)`, `M(x) = sum_a w(d_a / h) p(y_a) p(y_a)^T`,
@@ -279,10 +279,8 @@ fn moving_least_squares_row(
 /// `M^-1 e`, with one step of iterative refinement; `None` where `M` is ill-conditioned.
 fn solve_well_conditioned(moment: &Matrix4<f64>, e: &Vector4<f64>) -> Option<Vector4<f64>> {
     let eigenvalues = moment.symmetric_eigenvalues();
-    if !(eigenvalues.min() > MIN_RECIPROCAL_CONDITION * eigenvalues.max()) {
-        return None;
-    }
-    let factor = moment.cholesky()?;
+    let is_well_conditioned = eigenvalues.min() > MIN_RECIPROCAL_CONDITION * eigenvalues.max();
+    let factor = is_well_conditioned.then(|| moment.cholesky()).flatten()?;
     let b = factor.solve(e);
     Some(b + factor.solve(&(e - moment * b)))
 }

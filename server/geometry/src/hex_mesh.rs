@@ -244,7 +244,8 @@ impl HexMesh {
             let limit = MIN_RELATIVE_DETERMINANT * isoparametric::longest_edge(&positions).powi(3);
             for (corner, xi) in isoparametric::CORNERS.into_iter().enumerate() {
                 let determinant = isoparametric::jacobian(&positions, xi).determinant();
-                if !(determinant > limit) {
+                let is_upright = determinant > limit;
+                if !is_upright {
                     return Err(MeshError::Inverted {
                         hex,
                         corner,

@@ -105,7 +105,8 @@ pub fn inverse_map(corners: &[Point3<f64>; 8], x: &Point3<f64>) -> Option<[f64; 
         let residual = x - map(corners, xi.into());
         let step = jacobian(corners, xi.into()).try_inverse()? * residual;
         xi += step * (STEP_LIMIT / step.norm()).min(1.0);
-        if !(xi.amax() < 1e3) {
+        let is_near = xi.amax() < 1e3;
+        if !is_near {
             return None;
         }
         if residual.norm() <= tolerance {

@@ -99,7 +99,8 @@ impl Skin {
         skin.check_values()?;
         skin.check_manifold()?;
         let volume = skin.volume();
-        if !(volume > 0.0) {
+        let is_outward = volume > 0.0;
+        if !is_outward {
             return Err(SkinError::Inward { volume });
         }
         Ok(skin)
@@ -253,7 +254,8 @@ impl Skin {
                 });
             }
             let area = area_vector(&self.corner_positions(triangle)).norm();
-            if !(area > 0.0) {
+            let has_area = area > 0.0;
+            if !has_area {
                 return Err(SkinError::Degenerate { triangle, area });
             }
         }

@@ -303,6 +303,20 @@ fn a_support_that_is_too_small_falls_back_to_trilinear_and_is_listed() {
     assert!(unity < 1e-12 && linear < 1e-13);
 }
 
+/// At a node whose neighbours lie just within the radius the moment matrix is regular, but hardly.
+#[test]
+fn an_ill_conditioned_row_falls_back_too() {
+    let mesh = block([0.04; 3], [4, 4, 4]);
+    let node = [Point3::new(0.02, 0.02, 0.02)];
+    let fallbacks = |cells: f64| {
+        Embedding::new(&mesh, &node, support(cells))
+            .unwrap()
+            .fallbacks()
+            .len()
+    };
+    assert_eq!([1.005, 1.3].map(fallbacks), [1, 0]);
+}
+
 #[test]
 fn points_slightly_outside_are_embedded_and_reproduced() {
     let mesh = default_wedge();

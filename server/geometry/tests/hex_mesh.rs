@@ -138,7 +138,7 @@ fn a_position_that_is_not_a_number_is_refused() {
     assert!(
         error
             .to_string()
-            .starts_with("node 9 has the non-finite position [0.12, NaN, 0"),
+            .starts_with("node 9 has the non-finite position [0, NaN, 0]"),
         "{error}"
     );
 }
