@@ -17,6 +17,7 @@ mod report;
 mod rotation;
 mod solver;
 mod state;
+mod step;
 mod tick;
 mod tool;
 mod workspace;
@@ -25,6 +26,7 @@ pub use description::{
     ContactOptions, Coupling, ElementKind, Material, ModelDescription, Plane, Preconditioner, Sampling, SleepOptions,
     SolverOptions, SpringCoupling, ToolDescription, ToolShape,
 };
+pub use element::{lumped_mass, rest_stiffness};
 pub use model::{Cost, Model, ModelError};
 pub use probe::{NoProbe, Probe, Stage};
 pub use report::{ContactReading, TickReport, ToolReading};

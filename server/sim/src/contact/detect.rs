@@ -1,0 +1,372 @@
+//! Skin points near a body: vertices, edges and triangles, each with gap and normal.
+//!
+//! The signed distance of a convex tool is convex along the skin, so its smallest value over a triangle lies at a vertex,
+//! inside an edge, or inside the triangle under a point of the tool (an end of a rod, a corner of a hull). These three kinds
+//! of features are found separately; a 1 mm probe is so never lost between vertices.
+
+use plica_geometry::CLUSTER_SIZE;
+
+use super::solid::{nearest_on_segment, nearest_segments};
+use super::{Placement, SkinSurface, Solid, V3};
+use crate::embedding::SkinPositions;
+
+/// Features closer than this share of an edge to its end are left to the end.
+const INTERIOR: f32 = 0.05;
+
+/// Normals that point out of the skin by more than this cosine belong to the far side of the tool.
+const FAR_SIDE: f32 = 0.3;
+
+/// A skin point near a body.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Candidate {
+    /// Same value while the same vertex, edge, or pair of tool point and triangle touches.
+    pub(crate) feature: u64,
+    /// Skin vertices that carry the point, with weights; unused ones have weight 0.
+    pub(crate) vertices: [u32; 3],
+    pub(crate) weights: [f32; 3],
+    /// The point [m].
+    pub(crate) point: V3,
+    /// Unit normal from the body to the skin.
+    pub(crate) normal: V3,
+    /// Signed distance [m].
+    pub(crate) gap: f32,
+}
+
+/// Detection with its scratch.
+#[derive(Debug, Clone)]
+pub(crate) struct Detector {
+    near_clusters: Vec<u32>,
+    /// Signed distance of each vertex of the near clusters; infinite elsewhere.
+    distances: Vec<f32>,
+    candidates: Vec<Candidate>,
+    /// Candidates that did not fit.
+    pub(crate) overflow: u32,
+}
+
+/// Candidates kept per body before selection.
+const CAPACITY: usize = 4096;
+
+impl Detector {
+    pub(crate) fn new(n_skin: usize) -> Self {
+        Self {
+            near_clusters: Vec::with_capacity(n_skin.div_ceil(CLUSTER_SIZE)),
+            distances: vec![f32::INFINITY; n_skin],
+            candidates: Vec::with_capacity(CAPACITY),
+            overflow: 0,
+        }
+    }
+
+    /// Clusters of the last call to [`Self::find`].
+    pub(crate) fn near_clusters(&self) -> &[u32] {
+        &self.near_clusters
+    }
+
+    /// Vertices of the near clusters with their signed distances, of the last call to [`Self::find`].
+    pub(crate) fn near_vertices(&self) -> impl Iterator<Item = (usize, f32)> {
+        let vertices = self.near_clusters.iter().flat_map(|&c| {
+            let first = c as usize * CLUSTER_SIZE;
+            first..(first + CLUSTER_SIZE).min(self.distances.len())
+        });
+        vertices.map(|v| (v, self.distances[v]))
+    }
+
+    /// All features of the skin with a gap below `reach`.
+    pub(crate) fn find(
+        &mut self,
+        surface: &SkinSurface,
+        skin: &SkinPositions,
+        solid: &Solid,
+        placement: &Placement,
+        reach: f32,
+    ) -> &[Candidate] {
+        self.forget_vertices();
+        self.candidates.clear();
+        self.overflow = 0;
+        self.find_near_clusters(surface, skin, solid, placement, reach);
+        if !self.near_clusters.is_empty() {
+            self.measure_vertices(surface, skin, solid, placement);
+            self.vertices(surface, skin, solid, placement, reach);
+            if !matches!(solid, Solid::HalfSpace { .. }) {
+                self.edges(surface, skin, solid, placement, reach);
+                self.triangles(surface, skin, solid, placement, reach);
+            }
+        }
+        &self.candidates
+    }
+
+    /// Whether the body's box, grown by `reach`, meets any cluster.
+    pub(crate) fn is_near(
+        &mut self,
+        surface: &SkinSurface,
+        skin: &SkinPositions,
+        solid: &Solid,
+        placement: &Placement,
+        reach: f32,
+    ) -> bool {
+        self.forget_vertices();
+        self.find_near_clusters(surface, skin, solid, placement, reach);
+        !self.near_clusters.is_empty()
+    }
+
+    fn find_near_clusters(
+        &mut self,
+        surface: &SkinSurface,
+        skin: &SkinPositions,
+        solid: &Solid,
+        placement: &Placement,
+        reach: f32,
+    ) {
+        let margin = reach + 1.5 * surface.longest_edge;
+        let [low, high] = solid.bounds(placement);
+        let is_near = |bounds: &[[f32; 3]; 2]| match solid {
+            Solid::HalfSpace { normal } => {
+                let n = placement.rotation * normal;
+                let nearest = V3::from_fn(|k, _| bounds[usize::from(n[k] < 0.0)][k]);
+                n.dot(&(nearest - placement.origin)) < margin
+            }
+            _ => (0..3).all(|k| bounds[0][k] - margin <= high[k] && bounds[1][k] + margin >= low[k]),
+        };
+        self.near_clusters.clear();
+        for (cluster, bounds) in skin.boxes().iter().enumerate() {
+            if is_near(bounds) {
+                self.near_clusters.push(cluster as u32);
+            }
+        }
+    }
+
+    fn measure_vertices(&mut self, surface: &SkinSurface, skin: &SkinPositions, solid: &Solid, placement: &Placement) {
+        for &cluster in &self.near_clusters {
+            let first = cluster as usize * CLUSTER_SIZE;
+            let last = (first + CLUSTER_SIZE).min(surface.rest.len());
+            let [x, y, z] = skin.cluster(cluster as usize);
+            let distances = &mut self.distances[first..last];
+            match solid {
+                Solid::Round { a, b, radius } => {
+                    let (a, b) = (placement.to_world(*a), placement.to_world(*b));
+                    let axis = b - a;
+                    let inverse = if a == b { 0.0 } else { 1.0 / axis.norm_squared() };
+                    for (lane, d) in distances.iter_mut().enumerate() {
+                        let (px, py, pz) = (x[lane] - a.x, y[lane] - a.y, z[lane] - a.z);
+                        let t = ((px * axis.x + py * axis.y + pz * axis.z) * inverse).clamp(0.0, 1.0);
+                        let (qx, qy, qz) = (px - t * axis.x, py - t * axis.y, pz - t * axis.z);
+                        *d = (qx * qx + qy * qy + qz * qz).sqrt() - radius;
+                    }
+                }
+                Solid::Polytopes(parts) => {
+                    for (lane, d) in distances.iter_mut().enumerate() {
+                        let local = placement.to_local(V3::new(x[lane], y[lane], z[lane]));
+                        *d = parts.iter().map(|p| p.distance(&local).0).fold(f32::INFINITY, f32::min);
+                    }
+                }
+                Solid::HalfSpace { normal } => {
+                    let n = placement.rotation * normal;
+                    let offset = n.dot(&placement.origin);
+                    for (lane, d) in distances.iter_mut().enumerate() {
+                        *d = n.x * x[lane] + n.y * y[lane] + n.z * z[lane] - offset;
+                    }
+                }
+            }
+        }
+    }
+
+    fn forget_vertices(&mut self) {
+        for &cluster in &self.near_clusters {
+            let first = cluster as usize * CLUSTER_SIZE;
+            let last = (first + CLUSTER_SIZE).min(self.distances.len());
+            self.distances[first..last].fill(f32::INFINITY);
+        }
+    }
+
+    fn vertices(
+        &mut self,
+        surface: &SkinSurface,
+        skin: &SkinPositions,
+        solid: &Solid,
+        placement: &Placement,
+        reach: f32,
+    ) {
+        for index in 0..self.near_clusters.len() {
+            let first = self.near_clusters[index] as usize * CLUSTER_SIZE;
+            let last = (first + CLUSTER_SIZE).min(surface.rest.len());
+            for v in first..last {
+                let gap = self.distances[v];
+                if gap >= reach {
+                    continue;
+                }
+                let point = V3::from(skin.vertex(v));
+                let normal = vertex_normal(solid, placement, &point);
+                let outward: V3 =
+                    surface.triangles_around(v).iter().map(|&t| surface.triangle_normal(skin, t as usize)).sum();
+                if normal.dot(&outward) <= FAR_SIDE * outward.norm() {
+                    let (vertices, weights) = ([v as u32; 3], [1.0, 0.0, 0.0]);
+                    self.push(Candidate { feature: feature(0, v, 0), vertices, weights, point, normal, gap });
+                }
+            }
+        }
+    }
+
+    fn edges(&mut self, surface: &SkinSurface, skin: &SkinPositions, solid: &Solid, placement: &Placement, reach: f32) {
+        for index in 0..self.near_clusters.len() {
+            for &e in surface.edges_of_cluster(self.near_clusters[index] as usize) {
+                let [v0, v1] = surface.edges[e as usize].map(|v| v as usize);
+                let sum = self.distances[v0] + self.distances[v1];
+                // The distance is 1-Lipschitz: along an edge of length l it is at least (d0 + d1 - l) / 2.
+                if sum - 2.0 * surface.longest_edge >= 2.0 * reach {
+                    continue;
+                }
+                let (p, q) = (V3::from(skin.vertex(v0)), V3::from(skin.vertex(v1)));
+                if sum - (q - p).norm() >= 2.0 * reach {
+                    continue;
+                }
+                let Some((t, gap, normal)) = edge_minimum(solid, placement, &p, &q) else { continue };
+                if gap >= reach || !(INTERIOR..=1.0 - INTERIOR).contains(&t) {
+                    continue;
+                }
+                let sides = surface.edge_triangles[e as usize].map(|t| surface.triangle_normal(skin, t as usize));
+                let outward = sides[0] + sides[1];
+                if normal.dot(&outward) <= FAR_SIDE * outward.norm() {
+                    let vertices = [v0 as u32, v1 as u32, v0 as u32];
+                    let point = p + (q - p) * t;
+                    let weights = [1.0 - t, t, 0.0];
+                    self.push(Candidate { feature: feature(1, e as usize, 0), vertices, weights, point, normal, gap });
+                }
+            }
+        }
+    }
+
+    fn triangles(
+        &mut self,
+        surface: &SkinSurface,
+        skin: &SkinPositions,
+        solid: &Solid,
+        placement: &Placement,
+        reach: f32,
+    ) {
+        for index in 0..self.near_clusters.len() {
+            for &t in surface.triangles_of_cluster(self.near_clusters[index] as usize) {
+                let vertices = surface.triangles[t as usize];
+                let nearest = vertices.iter().map(|&v| self.distances[v as usize]).fold(f32::INFINITY, f32::min);
+                if nearest - surface.longest_edge >= reach {
+                    continue;
+                }
+                let corners = surface.corners(skin, t as usize);
+                match solid {
+                    Solid::Round { a, b, radius } => {
+                        let ends = [placement.to_world(*a), placement.to_world(*b)];
+                        let n_ends = if a == b { 1 } else { 2 };
+                        for (k, end) in ends.iter().take(n_ends).enumerate() {
+                            self.under_tool_point(t, vertices, &corners, end, *radius, *radius, reach, k);
+                        }
+                    }
+                    Solid::Polytopes(parts) => {
+                        for (k, part) in parts.iter().enumerate() {
+                            let center = placement.to_world(part.center);
+                            for (corner, point) in part.vertices.iter().enumerate() {
+                                let point = placement.to_world(*point);
+                                let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+                                let depth = (center - point).dot(&normal) / normal.norm();
+                                if depth > 0.0 {
+                                    self.under_tool_point(
+                                        t,
+                                        vertices,
+                                        &corners,
+                                        &point,
+                                        0.0,
+                                        depth,
+                                        reach,
+                                        (k << 12) + corner,
+                                    );
+                                }
+                            }
+                        }
+                    }
+                    Solid::HalfSpace { .. } => {}
+                }
+            }
+        }
+    }
+
+    /// The point of a triangle under a tool point of the given radius, if it is in its interior and no deeper than `depth`.
+    #[expect(clippy::too_many_arguments, reason = "the inner test of two loops; a struct would only rename them")]
+    fn under_tool_point(
+        &mut self,
+        triangle: u32,
+        vertices: [u32; 3],
+        corners: &[V3; 3],
+        tool_point: &V3,
+        radius: f32,
+        depth: f32,
+        reach: f32,
+        which: usize,
+    ) {
+        let [a, b, c] = corners;
+        let normal = (b - a).cross(&(c - a));
+        let area_squared = normal.norm_squared();
+        let height = (tool_point - a).dot(&normal);
+        let inverse = 1.0 / area_squared.max(1e-30);
+        let w1 = (tool_point - a).cross(&(c - a)).dot(&normal) * inverse;
+        let w2 = (b - a).cross(&(tool_point - a)).dot(&normal) * inverse;
+        let weights = [1.0 - w1 - w2, w1, w2];
+        if weights.iter().any(|w| *w < INTERIOR) {
+            return;
+        }
+        let distance = height * inverse.sqrt();
+        let gap = distance - radius;
+        if gap < reach && distance > -depth {
+            let point = a * weights[0] + b * weights[1] + c * weights[2];
+            let feature = feature(2, triangle as usize, which);
+            self.push(Candidate { feature, vertices, weights, point, normal: -normal * inverse.sqrt(), gap });
+        }
+    }
+
+    fn push(&mut self, candidate: Candidate) {
+        if self.candidates.len() < CAPACITY {
+            self.candidates.push(candidate);
+        } else {
+            self.overflow += 1;
+        }
+    }
+}
+
+fn feature(kind: u64, index: usize, tool_point: usize) -> u64 {
+    kind << 62 | (tool_point as u64) << 32 | index as u64
+}
+
+fn vertex_normal(solid: &Solid, placement: &Placement, point: &V3) -> V3 {
+    match solid {
+        Solid::Round { a, b, .. } => {
+            let (a, b) = (placement.to_world(*a), placement.to_world(*b));
+            let nearest = a + (b - a) * nearest_on_segment(point, &a, &b);
+            unit_or_up(point - nearest)
+        }
+        Solid::Polytopes(parts) => {
+            let local = placement.to_local(*point);
+            let nearest = parts.iter().map(|p| p.distance(&local)).min_by(|a, b| a.0.total_cmp(&b.0));
+            placement.rotation * nearest.map_or(V3::z(), |n| n.1)
+        }
+        Solid::HalfSpace { normal } => placement.rotation * normal,
+    }
+}
+
+/// Parameter, gap and normal where the distance along `p q` is smallest.
+fn edge_minimum(solid: &Solid, placement: &Placement, p: &V3, q: &V3) -> Option<(f32, f32, V3)> {
+    match solid {
+        Solid::Round { a, b, radius } => {
+            let (a, b) = (placement.to_world(*a), placement.to_world(*b));
+            let (t, s) = nearest_segments(p, q, &a, &b);
+            let apart = p + (q - p) * t - (a + (b - a) * s);
+            Some((t, apart.norm() - radius, unit_or_up(apart)))
+        }
+        Solid::Polytopes(parts) => {
+            let (p, q) = (placement.to_local(*p), placement.to_local(*q));
+            let minima = parts.iter().filter_map(|part| part.distance_to_segment(&p, &q));
+            let (t, gap, normal) = minima.min_by(|a, b| a.1.total_cmp(&b.1))?;
+            Some((t, gap, placement.rotation * normal))
+        }
+        Solid::HalfSpace { .. } => None,
+    }
+}
+
+fn unit_or_up(v: V3) -> V3 {
+    v.try_normalize(1e-12).unwrap_or_else(V3::z)
+}

@@ -1,0 +1,355 @@
+//! Constraint rows: which candidates become rows, and what they inherit from the contacts of the last tick.
+
+use super::{Candidate, V3};
+use crate::embedding::SkinEmbedding;
+use crate::lanes::Node;
+
+/// A contact as it is remembered from tick to tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Contact {
+    /// Tool index, or `n_tools + plane index`.
+    pub(crate) body: u32,
+    pub(crate) feature: u64,
+    /// Multipliers: normal force and tangential force on the skin [N].
+    pub(crate) normal_force: f32,
+    pub(crate) tangential_force: V3,
+    /// Tangential displacement since it sticks [m].
+    pub(crate) slip: V3,
+    pub(crate) slides: bool,
+    /// Secant stiffness of sliding, `mu f_n / |T u|` [N/m].
+    pub(crate) slide_stiffness: f32,
+    /// Penetration that was there when it began, fading out [m]; never positive.
+    pub(crate) bias: f32,
+    pub(crate) point: V3,
+    pub(crate) normal: V3,
+    /// Gap at the end of the tick [m].
+    pub(crate) gap: f32,
+    /// Forces of the last solve, for reports [N].
+    pub(crate) force: V3,
+}
+
+/// A contact in this step's solve.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Row {
+    pub(crate) contact: Contact,
+    /// From the tool's origin to the point [m].
+    pub(crate) arm: V3,
+    /// Gap that the solve closes: measured gap less bias [m].
+    pub(crate) gap: f32,
+    /// Normal and sticking stiffness of the augmented Lagrangian [N/m].
+    pub(crate) stiffness: f32,
+    pub(crate) friction: f32,
+    /// `tr(J A_0^-1 J^T) / 3` at the point [1/kg].
+    pub(crate) inverse_mass: f32,
+    pub(crate) active: bool,
+    /// Velocity of the skin point before the solve [m/s].
+    pub(crate) skin_velocity: V3,
+    /// Displacement of the skin against the tool in this step [m].
+    pub(crate) u: V3,
+    /// `J dv` of the last pass [m/s].
+    pub(crate) jdv: V3,
+    /// Force on the skin [N].
+    pub(crate) force: V3,
+    first_entry: u32,
+    last_entry: u32,
+}
+
+/// All rows of a step, with their sparse Jacobians over internal nodes.
+#[derive(Debug, Clone)]
+pub(crate) struct Rows {
+    pub(crate) rows: Vec<Row>,
+    nodes: Vec<u32>,
+    weights: Vec<f32>,
+    /// Selection scratch: `(is not loaded, predicted gap, candidate, old contact)`.
+    ranked: Vec<Ranked>,
+    chosen: Vec<Ranked>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Ranked {
+    is_loaded: bool,
+    predicted_gap: f32,
+    candidate: u32,
+    old: Option<u32>,
+}
+
+/// What is asked of the candidates of one body.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Selection<'a> {
+    pub(crate) body: u32,
+    pub(crate) friction: f32,
+    pub(crate) origin: V3,
+    pub(crate) activation_gap: f32,
+    pub(crate) max_contacts: usize,
+    /// Distance that rows keep when there are too many [m].
+    pub(crate) spacing: f32,
+    pub(crate) dt: f32,
+    /// `tr(J A_0^-1 J^T) / 3` of each skin vertex [1/kg].
+    pub(crate) inverse_mass: &'a [f32],
+    /// Contacts of the last tick, all bodies.
+    pub(crate) old: &'a [Contact],
+}
+
+/// Contacts hand their load over to a neighbour within this distance [m].
+const HAND_OVER: f32 = 10e-3;
+
+impl Rows {
+    pub(crate) fn new(n_bodies: usize, max_contacts: usize, longest_row: usize) -> Self {
+        let n = n_bodies * max_contacts;
+        Self {
+            rows: Vec::with_capacity(n),
+            nodes: Vec::with_capacity(3 * n * longest_row),
+            weights: Vec::with_capacity(3 * n * longest_row),
+            ranked: Vec::with_capacity(4096),
+            chosen: Vec::with_capacity(max_contacts),
+        }
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.rows.clear();
+        self.nodes.clear();
+        self.weights.clear();
+    }
+
+    /// Turns the candidates of one body into rows. Returns how many had to be left out.
+    ///
+    /// `tool_velocity(arm)` is the free velocity of the body's point at `arm`.
+    pub(crate) fn select(
+        &mut self,
+        embedding: &SkinEmbedding,
+        v: &[Node],
+        candidates: &[Candidate],
+        tool_velocity: impl Fn(V3) -> V3,
+        selection: &Selection<'_>,
+    ) -> u32 {
+        self.rank(embedding, v, candidates, tool_velocity, selection);
+        let dropped = self.choose(candidates, selection);
+        let first_row = self.rows.len();
+        for index in 0..self.chosen.len() {
+            let ranked = self.chosen[index];
+            let candidate = &candidates[ranked.candidate as usize];
+            self.push(embedding, v, candidate, ranked.old.map(|o| &selection.old[o as usize]), selection);
+        }
+        self.hand_over(first_row, selection);
+        dropped
+    }
+
+    /// Candidates that could touch in this step, with the old contact they continue.
+    fn rank(
+        &mut self,
+        embedding: &SkinEmbedding,
+        v: &[Node],
+        candidates: &[Candidate],
+        tool_velocity: impl Fn(V3) -> V3,
+        selection: &Selection<'_>,
+    ) {
+        self.ranked.clear();
+        for (index, c) in candidates.iter().enumerate() {
+            let relative = point_velocity(embedding, v, c) - tool_velocity(c.point - selection.origin);
+            let predicted_gap = c.gap.min(c.gap + selection.dt * c.normal.dot(&relative));
+            if predicted_gap >= selection.activation_gap {
+                continue;
+            }
+            let is_same = |o: &Contact| o.body == selection.body && o.feature == c.feature;
+            let old = selection.old.iter().position(is_same);
+            let is_loaded = old.is_some_and(|o| selection.old[o].normal_force > 0.0);
+            let old = old.map(|o| o as u32);
+            self.ranked.push(Ranked { is_loaded, predicted_gap, candidate: index as u32, old });
+        }
+    }
+
+    /// All of them if they fit; else loaded ones, then the deepest ones at a distance from each other, then the deepest.
+    fn choose(&mut self, candidates: &[Candidate], selection: &Selection<'_>) -> u32 {
+        self.chosen.clear();
+        if self.ranked.len() <= selection.max_contacts {
+            self.chosen.extend_from_slice(&self.ranked);
+            return 0;
+        }
+        self.ranked.sort_unstable_by(|a, b| {
+            let order = b.is_loaded.cmp(&a.is_loaded).then(a.predicted_gap.total_cmp(&b.predicted_gap));
+            order.then(a.candidate.cmp(&b.candidate))
+        });
+        let spacing_squared = selection.spacing * selection.spacing;
+        let point = |r: &Ranked| candidates[r.candidate as usize].point;
+        for ranked in &self.ranked {
+            let is_apart = |other: &Ranked| (point(ranked) - point(other)).norm_squared() > spacing_squared;
+            if self.chosen.len() < selection.max_contacts && (ranked.is_loaded || self.chosen.iter().all(is_apart)) {
+                self.chosen.push(*ranked);
+            }
+        }
+        for ranked in &self.ranked {
+            let is_chosen = self.chosen.iter().any(|c| c.candidate == ranked.candidate);
+            if self.chosen.len() < selection.max_contacts && !is_chosen {
+                self.chosen.push(*ranked);
+            }
+        }
+        (self.ranked.len() - self.chosen.len()) as u32
+    }
+
+    fn push(
+        &mut self,
+        embedding: &SkinEmbedding,
+        v: &[Node],
+        candidate: &Candidate,
+        old: Option<&Contact>,
+        selection: &Selection<'_>,
+    ) {
+        let first_entry = self.nodes.len() as u32;
+        for (vertex, weight) in carriers(candidate) {
+            let (nodes, weights) = embedding.row(vertex);
+            self.nodes.extend_from_slice(nodes);
+            self.weights.extend(weights.iter().map(|w| w * weight));
+        }
+        let contact = match old {
+            Some(old) => continued(old, candidate),
+            None => begun(candidate, selection),
+        };
+        self.rows.push(Row {
+            contact,
+            arm: candidate.point - selection.origin,
+            gap: candidate.gap - contact.bias,
+            stiffness: 0.0,
+            friction: selection.friction,
+            inverse_mass: carriers(candidate).map(|(v, w)| w * selection.inverse_mass[v]).sum(),
+            active: false,
+            skin_velocity: V3::zeros(),
+            u: V3::zeros(),
+            jdv: V3::zeros(),
+            force: V3::zeros(),
+            first_entry,
+            last_entry: self.nodes.len() as u32,
+        });
+        let row = self.rows.len() - 1;
+        self.rows[row].skin_velocity = self.jacobian_product(row, v);
+    }
+
+    /// Loaded contacts that found no row give their load to the nearest row of their body. A row that is new takes their
+    /// whole state, so that a contact that walks from one feature of the skin to the next goes on as it was.
+    fn hand_over(&mut self, first_row: usize, selection: &Selection<'_>) {
+        let rows = &mut self.rows[first_row..];
+        let is_continued = |rows: &[Row], o: &Contact| rows.iter().any(|r| r.contact.feature == o.feature);
+        let slides = selection.old.iter().any(|o| o.body == selection.body && o.slides && o.normal_force > 0.0);
+        let n_old = selection.old.len();
+        for row in rows.iter_mut() {
+            let feature = row.contact.feature;
+            let is_new = !selection.old.iter().any(|o| o.body == selection.body && o.feature == feature);
+            row.contact.slides |= is_new && slides;
+        }
+        for index in 0..n_old {
+            let old = &selection.old[index];
+            if old.body != selection.body || old.normal_force <= 0.0 || is_continued(rows, old) {
+                continue;
+            }
+            let distance = |r: &Row| (r.contact.point - old.point).norm_squared();
+            let nearest = rows.iter_mut().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            let Some(row) = nearest.filter(|r| distance(r) < HAND_OVER * HAND_OVER) else { continue };
+            let is_untouched = row.contact.normal_force == 0.0
+                && !selection.old.iter().any(|o| o.body == old.body && o.feature == row.contact.feature);
+            let c = &mut row.contact;
+            if is_untouched {
+                (c.slides, c.slide_stiffness, c.slip) =
+                    (old.slides, old.slide_stiffness, tangent(&c.normal, &old.slip));
+                row.gap += c.bias - old.bias;
+                c.bias = old.bias;
+            }
+            c.normal_force += old.normal_force;
+            c.tangential_force += tangent(&c.normal, &old.tangential_force);
+        }
+    }
+
+    /// `J v`: velocity of the row's skin point.
+    #[inline(always)]
+    pub(crate) fn jacobian_product(&self, row: usize, v: &[Node]) -> V3 {
+        let row = &self.rows[row];
+        let range = row.first_entry as usize..row.last_entry as usize;
+        let mut sum = [0.0_f32; 4];
+        for (&node, &w) in self.nodes[range.clone()].iter().zip(&self.weights[range]) {
+            let n = &v[node as usize];
+            for k in 0..4 {
+                sum[k] = w.mul_add(n[k], sum[k]);
+            }
+        }
+        V3::new(sum[0], sum[1], sum[2])
+    }
+
+    /// How many active rows load the place of this one, itself included: `sum (1 - d^2 / cell^2)^2`.
+    pub(crate) fn crowding(&self, row: usize, cell: f32) -> f32 {
+        let point = self.rows[row].contact.point;
+        let overlap = |other: &Row| {
+            let x = 1.0 - (other.contact.point - point).norm_squared() / (cell * cell);
+            if x > 0.0 { x * x } else { 0.0 }
+        };
+        let others = self.rows.iter().enumerate().filter(|&(i, r)| i != row && r.active);
+        1.0 + others.map(|(_, r)| overlap(r)).sum::<f32>()
+    }
+
+    /// `out += scale * sum J^T f` over all rows.
+    pub(crate) fn add_forces(&self, scale: f32, out: &mut [Node]) {
+        for (index, row) in self.rows.iter().enumerate().filter(|(_, r)| r.active) {
+            self.add_transpose_product(index, &(row.force * scale), out);
+        }
+    }
+
+    /// `out += J^T f`
+    #[inline(always)]
+    pub(crate) fn add_transpose_product(&self, row: usize, f: &V3, out: &mut [Node]) {
+        let row = &self.rows[row];
+        let range = row.first_entry as usize..row.last_entry as usize;
+        let padded = [f.x, f.y, f.z, 0.0];
+        for (&node, &w) in self.nodes[range.clone()].iter().zip(&self.weights[range]) {
+            let n = &mut out[node as usize];
+            for k in 0..4 {
+                n[k] = w.mul_add(padded[k], n[k]);
+            }
+        }
+    }
+}
+
+/// Vertices that carry a candidate, with non-zero weight.
+fn carriers(candidate: &Candidate) -> impl Iterator<Item = (usize, f32)> {
+    candidate.vertices.into_iter().zip(candidate.weights).filter(|c| c.1 != 0.0).map(|(v, w)| (v as usize, w))
+}
+
+fn point_velocity(embedding: &SkinEmbedding, v: &[Node], candidate: &Candidate) -> V3 {
+    let mut velocity = V3::zeros();
+    for (vertex, weight) in carriers(candidate) {
+        let (nodes, weights) = embedding.row(vertex);
+        for (&node, w) in nodes.iter().zip(weights) {
+            let n = &v[node as usize];
+            velocity += V3::new(n[0], n[1], n[2]) * (w * weight);
+        }
+    }
+    velocity
+}
+
+fn continued(old: &Contact, candidate: &Candidate) -> Contact {
+    Contact {
+        tangential_force: tangent(&candidate.normal, &old.tangential_force),
+        slip: tangent(&candidate.normal, &old.slip),
+        point: candidate.point,
+        normal: candidate.normal,
+        ..*old
+    }
+}
+
+fn begun(candidate: &Candidate, selection: &Selection<'_>) -> Contact {
+    Contact {
+        body: selection.body,
+        feature: candidate.feature,
+        normal_force: 0.0,
+        tangential_force: V3::zeros(),
+        slip: V3::zeros(),
+        slides: false,
+        slide_stiffness: 0.0,
+        bias: candidate.gap.min(0.0),
+        point: candidate.point,
+        normal: candidate.normal,
+        gap: candidate.gap,
+        force: V3::zeros(),
+    }
+}
+
+/// The part of `v` orthogonal to the unit vector `n`.
+pub(crate) fn tangent(n: &V3, v: &V3) -> V3 {
+    v - n * n.dot(v)
+}

@@ -1,0 +1,284 @@
+//! What never changes while a scene runs: tables built from a [`ModelDescription`].
+
+use plica_geometry::HexMesh;
+use thiserror::Error;
+
+use crate::contact::{SkinSurface, Solid, V3};
+use crate::description::{Material, ModelDescription, Preconditioner};
+use crate::element::{ElementBatches, lumped_mass};
+use crate::embedding::SkinEmbedding;
+use crate::lanes::Node;
+use crate::solver::{BlockJacobi, BlockTridiagonal, NodeOrder, RestMatrix, WarpScratch};
+
+/// Largest factorisation that [`Preconditioner::Auto`] keeps: with the stiffness it should stay in the second-level cache.
+const AUTO_FACTOR_BYTES: usize = 1 << 21;
+
+/// Why a model could not be built.
+#[derive(Debug, Error)]
+pub enum ModelError {
+    /// An array of the description has another length than the mesh or skin asks for.
+    #[error("{what}: {found} entries, but {expected} are needed")]
+    Length {
+        /// Which array.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length it should have.
+        expected: usize,
+    },
+    /// Every node is fixed.
+    #[error("all {n_nodes} nodes are fixed: nothing can move")]
+    NothingFree {
+        /// Nodes of the mesh.
+        n_nodes: usize,
+    },
+    /// A number is outside its range.
+    #[error("{what} is {value}, allowed is {range}")]
+    Range {
+        /// Which number.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        range: &'static str,
+    },
+    /// The points of a tool's hull do not span a volume.
+    #[error("the shape of tool '{tool}' does not span a volume")]
+    FlatTool {
+        /// The tool.
+        tool: String,
+    },
+    /// The rest matrix has a singular block.
+    #[error("the rest matrix of {n_free} free nodes is singular: is a part of the mesh without stiffness?")]
+    Singular {
+        /// Free nodes.
+        n_free: usize,
+    },
+}
+
+/// Sizes and traffic of a tick, for `check` and for the roofline.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cost {
+    /// Nodes of the coarse mesh.
+    pub n_nodes: usize,
+    /// Nodes that can move.
+    pub n_free: usize,
+    /// Hexahedra, padding included.
+    pub n_hexes: usize,
+    /// Skin vertices.
+    pub n_skin: usize,
+    /// Whether the solver uses the block-tridiagonal preconditioner.
+    pub block_tridiagonal: bool,
+    /// Bytes that a force evaluation or stiffness product reads [B].
+    pub product_bytes: usize,
+    /// Floating-point operations of it.
+    pub product_flops: usize,
+    /// Bytes that one application of the preconditioner reads [B].
+    pub preconditioner_bytes: usize,
+    /// Bytes that the embedding reads and writes [B].
+    pub embedding_bytes: usize,
+}
+
+/// One scene's constant tables.
+#[derive(Debug, Clone)]
+pub struct Model {
+    pub(crate) description: ModelDescription,
+    pub(crate) order: NodeOrder,
+    pub(crate) n_free: usize,
+    pub(crate) elements: ElementBatches,
+    /// Lumped mass per free node [kg].
+    pub(crate) node_mass: Vec<f32>,
+    pub(crate) jacobi: BlockJacobi,
+    pub(crate) tridiagonal: Option<BlockTridiagonal>,
+    pub(crate) embedding: SkinEmbedding,
+    pub(crate) surface: SkinSurface,
+    /// Shapes of tools, then planes.
+    pub(crate) solids: Vec<Solid>,
+    /// Mean edge of the coarse mesh [m].
+    pub(crate) cell_size: f32,
+    /// Half the diagonal of the mesh's bounding box [m].
+    pub(crate) size: f32,
+    /// Length of a sub-step [s].
+    pub(crate) dt: f32,
+}
+
+impl Model {
+    /// Precomputes everything that a tick needs. Seconds for thousands of hexahedra, milliseconds for the wedge.
+    pub fn new(description: ModelDescription) -> Result<Self, ModelError> {
+        check(&description)?;
+        let d = &description;
+        let order = NodeOrder::new(&d.mesh, &d.fixed);
+        let n_free = order.n_free();
+        if n_free == 0 {
+            return Err(ModelError::NothingFree { n_nodes: d.mesh.n_nodes() });
+        }
+        let h = d.timestep_s / f64::from(d.substeps);
+        let mass = node_mass(&d.mesh, &order, &d.materials);
+        let matrix = RestMatrix::new(&d.mesh, &order, &mass, &d.materials, d.element, (h, d.mass_damping_per_s));
+        let wants_factor = match d.solver.preconditioner {
+            Preconditioner::Auto => BlockTridiagonal::bytes_for(&order) <= AUTO_FACTOR_BYTES,
+            Preconditioner::BlockTridiagonal => true,
+            Preconditioner::BlockJacobi => false,
+        };
+        let tridiagonal = match wants_factor {
+            true => Some(BlockTridiagonal::new(&matrix, &order).ok_or(ModelError::Singular { n_free })?),
+            false => None,
+        };
+        let jacobi = BlockJacobi::new(&matrix);
+        let embedding = SkinEmbedding::new(&d.skin, &d.embedding, &order.internal_of_mesh, n_free);
+        let inverse_mass = inverse_masses(&embedding, n_free, tridiagonal.as_ref(), &jacobi);
+        Ok(Self {
+            elements: ElementBatches::new(&d.mesh, &order.internal_of_mesh, &d.materials, d.element),
+            node_mass: mass[..n_free].iter().map(|&m| m as f32).collect(),
+            surface: SkinSurface::new(&d.skin, inverse_mass),
+            solids: solids(d)?,
+            cell_size: mean_edge(&d.mesh) as f32,
+            size: half_diagonal(&d.mesh) as f32,
+            dt: h as f32,
+            jacobi,
+            tridiagonal,
+            embedding,
+            order,
+            n_free,
+            description,
+        })
+    }
+
+    /// What the model was built from.
+    pub fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+
+    /// Nodes of the coarse mesh.
+    pub fn n_nodes(&self) -> usize {
+        self.description.mesh.n_nodes()
+    }
+
+    /// Vertices of the skin.
+    pub fn n_skin(&self) -> usize {
+        self.embedding.n_skin()
+    }
+
+    /// Tools of the scene.
+    pub fn n_tools(&self) -> usize {
+        self.description.tools.len()
+    }
+
+    /// Length of a tick [s].
+    pub fn timestep_s(&self) -> f64 {
+        self.description.timestep_s
+    }
+
+    /// Sizes and traffic of a tick.
+    pub fn cost(&self) -> Cost {
+        Cost {
+            n_nodes: self.n_nodes(),
+            n_free: self.n_free,
+            n_hexes: self.elements.n_batches() * crate::lanes::LANES,
+            n_skin: self.n_skin(),
+            block_tridiagonal: self.tridiagonal.is_some(),
+            product_bytes: self.elements.bytes_per_product(),
+            product_flops: self.elements.flops_per_product(),
+            preconditioner_bytes: self.tridiagonal.as_ref().map_or(self.jacobi.bytes(), BlockTridiagonal::bytes),
+            embedding_bytes: self.embedding.bytes(),
+        }
+    }
+
+    pub(crate) fn n_bodies(&self) -> usize {
+        self.solids.len()
+    }
+
+    /// Longest sparse row of the embedding.
+    pub(crate) fn longest_row(&self) -> usize {
+        (0..self.n_skin()).map(|v| self.embedding.row(v).0.len()).max().unwrap_or(0)
+    }
+}
+
+fn check(d: &ModelDescription) -> Result<(), ModelError> {
+    let lengths = [
+        ("fixed", d.fixed.len(), d.mesh.n_nodes()),
+        ("materials", d.materials.len(), d.mesh.n_hexes()),
+        ("embedding rows", d.embedding.n_rows(), d.skin.n_vertices()),
+    ];
+    for (what, found, expected) in lengths {
+        if found != expected {
+            return Err(ModelError::Length { what, found, expected });
+        }
+    }
+    let range =
+        |what, value: f64, ok: bool, range| if ok { Ok(()) } else { Err(ModelError::Range { what, value, range }) };
+    range("timestep_s", d.timestep_s, d.timestep_s > 0.0 && d.timestep_s <= 0.1, "(0, 0.1] s")?;
+    range("substeps", f64::from(d.substeps), d.substeps >= 1, "1 or more")?;
+    for m in &d.materials {
+        range(
+            "young_modulus_pa",
+            m.young_modulus_pa,
+            m.young_modulus_pa > 0.0 && m.young_modulus_pa.is_finite(),
+            "above 0",
+        )?;
+        range("poisson_ratio", m.poisson_ratio, (0.0..=0.499).contains(&m.poisson_ratio), "[0, 0.499]")?;
+        let density = m.density_kg_per_m3;
+        range("density_kg_per_m3", density, density > 0.0 && density.is_finite(), "above 0")?;
+    }
+    Ok(())
+}
+
+/// Lumped mass in internal order, `[n_nodes]` [kg].
+fn node_mass(mesh: &HexMesh, order: &NodeOrder, materials: &[Material]) -> Vec<f64> {
+    let mut mass = vec![0.0; mesh.n_nodes()];
+    for (hex, material) in mesh.hexes().iter().zip(materials) {
+        let shares = lumped_mass(&hex.map(|n| mesh.nodes()[n.index()]), material.density_kg_per_m3);
+        for (node, share) in hex.iter().zip(shares) {
+            mass[order.internal_of_mesh[node.index()] as usize] += share;
+        }
+    }
+    mass
+}
+
+/// `tr(J A_0^-1 J^T) / 3` of each skin vertex [1/kg]: how far it yields to a unit impulse. Without a factorisation the
+/// diagonal blocks stand in, which overstates the stiffness.
+fn inverse_masses(
+    embedding: &SkinEmbedding,
+    n_free: usize,
+    factor: Option<&BlockTridiagonal>,
+    jacobi: &BlockJacobi,
+) -> Vec<f32> {
+    let mut scratch = WarpScratch::new(n_free, factor);
+    let (mut load, mut response): (Vec<Node>, Vec<Node>) = (vec![[0.0; 4]; n_free], vec![[0.0; 4]; n_free]);
+    let mut of_vertex = |v: usize| {
+        let (nodes, weights) = embedding.row(v);
+        let mut trace = 0.0;
+        for axis in 0..3 {
+            nodes.iter().zip(weights).for_each(|(&n, &w)| load[n as usize][axis] = w);
+            match factor {
+                Some(factor) => factor.apply_warped(&load, &mut response, &mut scratch),
+                None => jacobi.apply(&load, &mut response),
+            }
+            trace += nodes.iter().zip(weights).map(|(&n, &w)| w * response[n as usize][axis]).sum::<f32>();
+            nodes.iter().for_each(|&n| load[n as usize][axis] = 0.0);
+        }
+        trace / 3.0
+    };
+    (0..embedding.n_skin()).map(&mut of_vertex).collect()
+}
+
+fn solids(d: &ModelDescription) -> Result<Vec<Solid>, ModelError> {
+    let tools =
+        d.tools.iter().map(|t| Solid::new(&t.shape).ok_or_else(|| ModelError::FlatTool { tool: t.name.clone() }));
+    let mut solids: Vec<Solid> = tools.collect::<Result<_, _>>()?;
+    for plane in &d.planes {
+        let normal: V3 = plane.normal.normalize().cast();
+        solids.push(Solid::HalfSpace { normal });
+    }
+    Ok(solids)
+}
+
+fn mean_edge(mesh: &HexMesh) -> f64 {
+    (mesh.volume() / mesh.n_hexes() as f64).cbrt()
+}
+
+fn half_diagonal(mesh: &HexMesh) -> f64 {
+    let start = (mesh.nodes()[0], mesh.nodes()[0]);
+    let (low, high) = mesh.nodes().iter().fold(start, |(l, h), p| (l.inf(p), h.sup(p)));
+    (high - low).norm() / 2.0
+}

@@ -1,0 +1,287 @@
+//! One implicit step of the coarse object, with its tools and supports [MG04].
+//!
+//! `A dv = r`, `A = M (1 + h alpha) + h^2 K(R)`, `r = h f(x + h v) + h M (g - alpha v)`; contact adds rows to `A` and `r`
+//! (see [`crate::contact`]), and two or three passes find which rows push and which slide.
+
+use nalgebra::{Isometry3, Vector6};
+
+use crate::contact::{
+    ContactCoupling, Placement, ProxyMotion, Rows, Selection, V3, at_arm, contact_point, evaluate, settle, stack_forces,
+};
+use crate::lanes::Node;
+use crate::model::Model;
+use crate::probe::{Probe, Stage};
+use crate::report::TickReport;
+use crate::solver::{CgInfo, CgStop, conjugate_gradient, norm_squared, set_zero};
+use crate::state::State;
+use crate::tool::Target;
+use crate::workspace::Workspace;
+
+/// Passes in which rows may switch either way.
+const FREE_PASSES: u32 = 3;
+/// Passes in all; the later ones only switch rows off.
+const MAX_PASSES: u32 = 8;
+/// A solve may leave this share of the contact impulse as residual.
+const IMPULSE_TOLERANCE: f32 = 1e-4;
+/// Contacts are looked for no farther than this many cells away.
+const MAX_REACH_CELLS: f32 = 2.0;
+
+/// One step of `model.dt`; sub-step `index` of the tick.
+pub(crate) fn step(
+    model: &Model,
+    index: u32,
+    state: &mut State,
+    workspace: &mut Workspace,
+    probe: &mut impl Probe,
+    report: &mut TickReport,
+) {
+    probe.enter(Stage::Solve);
+    rotate_elements(model, state, workspace);
+    load_residual(model, state, workspace);
+    probe.enter(Stage::Contact);
+    begin_tools(model, index, state, workspace);
+    find_contacts(model, state, workspace, report);
+    solve_with_contact(model, workspace, probe, report);
+    finish_tools(model, index, state, workspace);
+    remember_contacts(model, state, workspace, report);
+    probe.enter(Stage::Embedding);
+    advance(model, state, workspace);
+    model.embedding.apply(&state.u, &mut state.skin);
+}
+
+/// Tools of a sleeping object follow their devices.
+pub(crate) fn move_tools_freely(model: &Model, state: &mut State, workspace: &mut Workspace) {
+    workspace.rows.clear();
+    for index in 0..model.description.substeps {
+        begin_tools(model, index, state, workspace);
+        for (body, motion) in workspace.motions.iter_mut().enumerate() {
+            motion.factor(body as u32, &workspace.rows, model.dt);
+            motion.advance(&motion.solve(&motion.residual()));
+        }
+        finish_tools(model, index, state, workspace);
+    }
+}
+
+/// `world <- tool` in run-time precision.
+pub(crate) fn placement(pose: &Isometry3<f64>) -> Placement {
+    Placement { rotation: pose.rotation.to_rotation_matrix().matrix().cast(), origin: pose.translation.vector.cast() }
+}
+
+fn rotate_elements(model: &Model, state: &mut State, workspace: &mut Workspace) {
+    model.elements.update_rotations(&state.u, &mut state.quaternions, &mut workspace.rotations);
+    if model.tridiagonal.is_some() {
+        set_zero(&mut workspace.node_quaternions);
+        model.elements.add_node_quaternions(&state.quaternions, &mut workspace.node_quaternions);
+        workspace.warp.set_rotations(&workspace.node_quaternions[..model.n_free]);
+    }
+}
+
+/// `r = h f(x + h v) + h M (g - alpha v)`
+fn load_residual(model: &Model, state: &State, workspace: &mut Workspace) {
+    let (h, d) = (model.dt, &model.description);
+    let gravity: V3 = d.gravity_m_per_s2.cast();
+    let alpha = d.mass_damping_per_s as f32;
+    set_zero(&mut workspace.dv);
+    set_zero(&mut workspace.residual);
+    model.elements.add_forces(&state.u, &state.v, h, h, &workspace.rotations, &mut workspace.residual);
+    for ((r, v), m) in workspace.residual.iter_mut().zip(&state.v).zip(&model.node_mass) {
+        for k in 0..3 {
+            r[k] += h * m * (gravity[k] - alpha * v[k]);
+        }
+    }
+}
+
+/// The part of this tick's motion that belongs to one sub-step.
+fn substep_target(model: &Model, index: u32, target: &Target) -> Target {
+    let n = f64::from(model.description.substeps);
+    let at = |share: f64| {
+        let t = target.before.translation.vector.lerp(&target.pose.translation.vector, share);
+        let r = target.before.rotation.try_slerp(&target.pose.rotation, share, 1e-12).unwrap_or(target.pose.rotation);
+        Isometry3::from_parts(t.into(), r)
+    };
+    match model.description.substeps {
+        1 => *target,
+        _ => Target { before: at(f64::from(index) / n), pose: at(f64::from(index + 1) / n), placed: false },
+    }
+}
+
+fn begin_tools(model: &Model, index: u32, state: &mut State, workspace: &mut Workspace) {
+    for (body, tool) in model.description.tools.iter().enumerate() {
+        let Some(target) = &workspace.targets[body] else { continue };
+        let target = substep_target(model, index, target);
+        workspace.motions[body] = state.proxies[body].begin(tool, &target, f64::from(model.dt));
+        workspace.placements[body] = placement(&state.proxies[body].pose);
+    }
+}
+
+fn finish_tools(model: &Model, index: u32, state: &mut State, workspace: &mut Workspace) {
+    for (body, tool) in model.description.tools.iter().enumerate() {
+        let Some(target) = &workspace.targets[body] else { continue };
+        let target = substep_target(model, index, target);
+        state.proxies[body].finish(tool, &target, &workspace.motions[body], f64::from(model.dt));
+    }
+}
+
+/// Rows of all bodies, with multipliers from the last tick.
+fn find_contacts(model: &Model, state: &State, workspace: &mut Workspace, report: &mut TickReport) {
+    let options = &model.description.contact;
+    let n_tools = model.n_tools();
+    let skin_motion = state.max_speed() * model.dt;
+    workspace.rows.clear();
+    for (body, solid) in model.solids.iter().enumerate() {
+        if body < n_tools && workspace.targets[body].is_none() {
+            continue;
+        }
+        let lever = workspace.motions.get(body).map_or(1.0, |m| m.lever);
+        let twist = workspace.motions.get(body).map_or(Vector6::zeros(), ProxyMotion::free_twist);
+        let speed = twist.fixed_rows::<3>(0).norm() + twist.fixed_rows::<3>(3).norm() / lever * solid.reach();
+        let motion = (speed * model.dt + skin_motion).min(MAX_REACH_CELLS * model.cell_size);
+        let placement = workspace.placements[body];
+        let reach = options.activation_gap_m as f32 + motion;
+        let candidates = workspace.detector.find(&model.surface, &state.skin, solid, &placement, reach);
+        let friction = model.description.tools.get(body).map_or(options.plane_friction, |t| t.friction);
+        let selection = Selection {
+            body: body as u32,
+            friction: friction as f32,
+            origin: placement.origin,
+            activation_gap: options.activation_gap_m as f32,
+            max_contacts: options.max_contacts,
+            spacing: 0.35 * model.cell_size,
+            dt: model.dt,
+            inverse_mass: &model.surface.inverse_mass,
+            old: &state.contacts,
+        };
+        let first_row = workspace.rows.rows.len();
+        let velocity = |arm: V3| at_arm(&twist, lever, &arm);
+        report.dropped_contacts += workspace.rows.select(&model.embedding, &state.v, candidates, velocity, &selection);
+        let touches = workspace.rows.rows[first_row..].iter().any(|r| r.contact.normal_force > 0.0 || r.gap <= 0.0);
+        if let Some(point) = workspace.contact_points.get_mut(body).filter(|_| touches) {
+            *point = contact_point(&model.surface, &state.skin, &workspace.detector, solid, &placement);
+        }
+    }
+    predict_rows(model, &mut workspace.rows, &workspace.motions);
+}
+
+/// Displacements before the solve, stiffness, and which rows are expected to push.
+///
+/// Stiffness `kappa / (h^2 w o)`: `1 / (h^2 w)` is what the skin point itself resists with, mass included, so that nothing
+/// depends on Young's modulus or the time step; `o` counts the rows that load the same place.
+fn predict_rows(model: &Model, rows: &mut Rows, motions: &[ProxyMotion]) {
+    let (h, kappa) = (model.dt, model.description.contact.stiffness_ratio as f32);
+    for row in &mut rows.rows {
+        let tool_velocity = motions.get(row.contact.body as usize).map_or(V3::zeros(), |m| m.point_velocity(&row.arm));
+        row.u = (row.skin_velocity - tool_velocity) * h;
+        row.active = row.contact.normal_force > 0.0 || row.gap + row.contact.normal.dot(&row.u) < 0.0;
+    }
+    for index in 0..rows.rows.len() {
+        let row = &rows.rows[index];
+        let yields = row.inverse_mass;
+        let crowd = rows.crowding(index, model.cell_size);
+        rows.rows[index].stiffness = kappa / (h * h * yields * crowd);
+    }
+    stack_forces(rows);
+}
+
+/// Solves, adapts the rows, and solves again until every row pushes and every friction state holds.
+fn solve_with_contact(model: &Model, workspace: &mut Workspace, probe: &mut impl Probe, report: &mut TickReport) {
+    let multipliers: f32 = workspace.rows.rows.iter().map(|r| r.contact.normal_force).sum();
+    let mut stop = None;
+    for pass in 0..MAX_PASSES {
+        let Workspace { coupling, rows, motions, residual, .. } = workspace;
+        coupling.begin_pass(rows, motions, model.dt, residual);
+        probe.enter(Stage::Solve);
+        let bound = *stop.get_or_insert_with(|| {
+            let first = norm_squared(&workspace.residual[..model.n_free]).sqrt();
+            model.description.solver.tolerance as f32 * first + IMPULSE_TOLERANCE * model.dt * multipliers
+        });
+        let (info, fell_back) = solve(model, workspace, bound);
+        report.iterations += info.iterations;
+        report.fallbacks += u32::from(fell_back);
+        report.passes += 1;
+        probe.enter(Stage::Contact);
+        let Workspace { coupling, rows, motions, residual, dv, .. } = workspace;
+        coupling.end_pass(rows, motions, model.dt, dv);
+        stack_forces(rows);
+        if rows.rows.is_empty() || pass + 1 == MAX_PASSES {
+            break;
+        }
+        rows.add_forces(-model.dt, residual);
+        if !evaluate(rows, pass + 1 < FREE_PASSES) {
+            break;
+        }
+        stack_forces(rows);
+    }
+}
+
+/// Conjugate gradients; a solve that does not converge is restored and repeated with block Jacobi.
+fn solve(model: &Model, workspace: &mut Workspace, residual_bound: f32) -> (CgInfo, bool) {
+    let options = &model.description.solver;
+    let Workspace { rotations, warp, cg, dv, residual, dv_before, residual_before, rows, coupling, motions, .. } =
+        workspace;
+    let mut multiply = |p: &[Node], out: &mut [Node]| multiply(model, rotations, (coupling, rows, motions), p, out);
+    let primary = CgStop { residual: residual_bound, max_iterations: options.max_iterations };
+    let Some(tridiagonal) = &model.tridiagonal else {
+        let jacobi = |r: &[Node], z: &mut [Node]| model.jacobi.apply(r, z);
+        return (conjugate_gradient(dv, residual, &mut multiply, jacobi, primary, cg), false);
+    };
+    dv_before.copy_from_slice(dv);
+    residual_before.copy_from_slice(residual);
+    let warped = |r: &[Node], z: &mut [Node]| tridiagonal.apply_warped(r, z, warp);
+    let info = conjugate_gradient(dv, residual, &mut multiply, warped, primary, cg);
+    if info.converged {
+        return (info, false);
+    }
+    dv.copy_from_slice(dv_before);
+    residual.copy_from_slice(residual_before);
+    let jacobi = |r: &[Node], z: &mut [Node]| model.jacobi.apply(r, z);
+    let fallback = CgStop { residual: residual_bound, max_iterations: options.fallback_iterations };
+    let second = conjugate_gradient(dv, residual, &mut multiply, jacobi, fallback, cg);
+    (CgInfo { iterations: info.iterations + second.iterations, ..second }, true)
+}
+
+/// `out = A p`
+#[inline(always)]
+fn multiply(
+    model: &Model,
+    rotations: &[crate::lanes::Mat3],
+    (coupling, rows, motions): (&mut ContactCoupling, &Rows, &[ProxyMotion]),
+    p: &[Node],
+    out: &mut [Node],
+) {
+    let h = model.dt;
+    let inertia = 1.0 + h * model.description.mass_damping_per_s as f32;
+    set_zero(out);
+    model.elements.add_product(p, h * h, rotations, out);
+    for ((out, p), m) in out.iter_mut().zip(p).zip(&model.node_mass) {
+        for k in 0..4 {
+            out[k] = (m * inertia).mul_add(p[k], out[k]);
+        }
+    }
+    coupling.add_product(rows, motions, h, p, out);
+}
+
+/// `v += dv`, `x += h v`
+fn advance(model: &Model, state: &mut State, workspace: &Workspace) {
+    let nodes = state.u.iter_mut().zip(&mut state.v).zip(&workspace.dv);
+    for ((u, v), dv) in nodes.take(model.n_free) {
+        for k in 0..3 {
+            v[k] += dv[k];
+            u[k] = model.dt.mul_add(v[k], u[k]);
+        }
+    }
+}
+
+/// Multipliers for the next step, and what the report says about contact.
+fn remember_contacts(model: &Model, state: &mut State, workspace: &mut Workspace, report: &mut TickReport) {
+    let options = &model.description.contact;
+    let decay = (1.0 - f64::from(model.dt) / options.recovery_time_s).max(0.0) as f32;
+    state.contacts.clear();
+    report.n_contacts = 0;
+    report.max_penetration_m = 0.0;
+    for row in &mut workspace.rows.rows {
+        settle(row, options.multiplier_relaxation as f32, decay);
+        state.contacts.push(row.contact);
+        report.n_contacts += u32::from(row.active);
+        report.max_penetration_m = report.max_penetration_m.max(-row.contact.gap);
+    }
+}

@@ -1,0 +1,180 @@
+//! From device poses to one target pose per tick: frames, ring, sampling, staleness, re-placement.
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+use crate::description::{Sampling, ToolDescription};
+
+/// A device pose as the tracker reported it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PoseSample {
+    /// Sequence number of its source.
+    pub sequence: u64,
+    /// Time on its source's clock [ns].
+    pub source_time_ns: u64,
+    /// Whether the tracker saw the marker; an invalid sample is no news.
+    pub valid: bool,
+    /// `tracker <- marker` [m].
+    pub pose: Isometry3<f64>,
+}
+
+/// A pose for one tool.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ToolPose {
+    /// Index into the description's tools.
+    pub tool: usize,
+    /// The pose.
+    pub sample: PoseSample,
+}
+
+/// Samples kept per tool.
+const RING: usize = 16;
+
+/// A sample in world coordinates with its arrival.
+#[derive(Debug, Clone, Copy)]
+struct Arrived {
+    arrival_s: f64,
+    source_s: f64,
+    world_from_tool: Isometry3<f64>,
+}
+
+/// The pose ring of one tool and the target that its proxy follows.
+#[derive(Debug, Clone)]
+pub(crate) struct PoseTrack {
+    ring: [Option<Arrived>; RING],
+    newest: usize,
+    /// Smallest `arrival - source time` seen [s].
+    clock_offset_s: f64,
+    target: Option<Target>,
+    pub(crate) sequence: u64,
+    pub(crate) source_time_ns: u64,
+    pub(crate) placements: u64,
+    /// A sample came that is too far from the one before it: the next target is a placement.
+    must_place: bool,
+}
+
+/// Where the device is at the end of this tick, and how it moved in it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Target {
+    pub(crate) pose: Isometry3<f64>,
+    /// Pose at the start of the tick.
+    pub(crate) before: Isometry3<f64>,
+    /// The target jumped: no sweep between `before` and `pose`.
+    pub(crate) placed: bool,
+}
+
+impl PoseTrack {
+    pub(crate) fn new() -> Self {
+        Self {
+            ring: [None; RING],
+            newest: 0,
+            clock_offset_s: f64::INFINITY,
+            target: None,
+            sequence: 0,
+            source_time_ns: 0,
+            placements: 0,
+            must_place: false,
+        }
+    }
+
+    /// Takes a sample in. Returns false, and changes nothing, if a component is not finite.
+    pub(crate) fn push(&mut self, tool: &ToolDescription, sample: &PoseSample, clock_s: f64) -> bool {
+        if !is_finite(&sample.pose) {
+            return false;
+        }
+        if !sample.valid {
+            return true;
+        }
+        let source_s = sample.source_time_ns as f64 * 1e-9;
+        let arrived = Arrived { arrival_s: clock_s, source_s, world_from_tool: world_from_tool(tool, &sample.pose) };
+        if let Some(last) = self.ring[self.newest] {
+            self.must_place |= is_jump(&last, &arrived, tool.max_tool_speed_m_per_s);
+        }
+        self.newest = (self.newest + 1) % RING;
+        self.ring[self.newest] = Some(arrived);
+        self.clock_offset_s = self.clock_offset_s.min(clock_s - source_s);
+        self.sequence = sample.sequence;
+        self.source_time_ns = sample.source_time_ns;
+        true
+    }
+
+    /// Age of the newest sample [s]; infinite if there was none.
+    pub(crate) fn age_s(&self, clock_s: f64) -> f64 {
+        self.ring[self.newest].map_or(f64::INFINITY, |a| clock_s - a.arrival_s)
+    }
+
+    /// Moves the target on by one tick of `dt` seconds; `None` before the first sample.
+    pub(crate) fn advance(&mut self, tool: &ToolDescription, clock_s: f64, dt: f64) -> Option<Target> {
+        let wanted = match tool.sampling {
+            Sampling::Latest => self.ring[self.newest]?.world_from_tool,
+            Sampling::Interpolate { delay_s } => self.interpolate(clock_s - delay_s)?,
+        };
+        let target = match self.target {
+            Some(last) if !self.must_place => Target {
+                pose: towards(&last.pose, &wanted, tool.max_tool_speed_m_per_s * dt),
+                before: last.pose,
+                placed: false,
+            },
+            last => {
+                self.placements += u64::from(last.is_some());
+                Target { pose: wanted, before: wanted, placed: true }
+            }
+        };
+        self.must_place = false;
+        self.target = Some(target);
+        self.target
+    }
+
+    /// Pose at `time_s` on the caller's clock, from the two samples around it; held at either end of the ring.
+    fn interpolate(&self, time_s: f64) -> Option<Isometry3<f64>> {
+        let source_s = time_s - self.clock_offset_s;
+        let mut after: Option<Arrived> = None;
+        for back in 0..RING {
+            let Some(sample) = self.ring[(self.newest + RING - back) % RING] else { break };
+            if sample.source_s <= source_s {
+                return Some(after.map_or(sample.world_from_tool, |after| between(&sample, &after, source_s)));
+            }
+            after = Some(sample);
+        }
+        after.map(|a| a.world_from_tool)
+    }
+}
+
+/// `world_from_tracker * scaled(tracker_from_marker) * tool_from_marker^-1`
+fn world_from_tool(tool: &ToolDescription, tracker_from_marker: &Isometry3<f64>) -> Isometry3<f64> {
+    let scaled = Translation3::from(tracker_from_marker.translation.vector * tool.position_scale);
+    tool.world_from_tracker
+        * Isometry3::from_parts(scaled, tracker_from_marker.rotation)
+        * tool.tool_from_marker.inverse()
+}
+
+/// Whether the tool would have to be faster than it may be to get from one sample to the next.
+fn is_jump(from: &Arrived, to: &Arrived, max_speed: f64) -> bool {
+    let distance = (to.world_from_tool.translation.vector - from.world_from_tool.translation.vector).norm();
+    let elapsed = (to.source_s - from.source_s).max(to.arrival_s - from.arrival_s);
+    distance > max_speed * elapsed.max(1e-3)
+}
+
+/// From `from` to `to`, at most `max_distance`; a turn counts as the path of a point at 50 mm.
+fn towards(from: &Isometry3<f64>, to: &Isometry3<f64>, max_distance: f64) -> Isometry3<f64> {
+    const LEVER_M: f64 = 0.05;
+    let distance = (to.translation.vector - from.translation.vector).norm();
+    let path = distance.max(LEVER_M * from.rotation.angle_to(&to.rotation));
+    if path <= max_distance { *to } else { blend(from, to, max_distance / path) }
+}
+
+fn between(from: &Arrived, to: &Arrived, source_s: f64) -> Isometry3<f64> {
+    let span = (to.source_s - from.source_s).max(1e-9);
+    blend(&from.world_from_tool, &to.world_from_tool, ((source_s - from.source_s) / span).clamp(0.0, 1.0))
+}
+
+fn blend(from: &Isometry3<f64>, to: &Isometry3<f64>, share: f64) -> Isometry3<f64> {
+    let translation = from.translation.vector.lerp(&to.translation.vector, share);
+    let rotation = from.rotation.try_slerp(&to.rotation, share, 1e-12).unwrap_or(to.rotation);
+    Isometry3::from_parts(translation.into(), rotation)
+}
+
+fn is_finite(pose: &Isometry3<f64>) -> bool {
+    let translation: &Vector3<f64> = &pose.translation.vector;
+    let rotation: &UnitQuaternion<f64> = &pose.rotation;
+    translation.iter().chain(rotation.coords.iter()).all(|c| c.is_finite())
+}
