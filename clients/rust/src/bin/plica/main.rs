@@ -1,2 +1,40 @@
-//! The `plica` command.
-fn main() {}
+//! The `plica` command: asks, drives, records and replays a running daemon.
+
+mod args;
+mod commands;
+mod output;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use args::{Args, Command};
+use commands::{ask, export, latency, probe, record, replay};
+use output::Output;
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    let output = Output {
+        json: args.common.json,
+    };
+    match run(&args, output) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            output.error(&error);
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(args: &Args, output: Output) -> anyhow::Result<()> {
+    let connect = || args.common.connect();
+    match &args.command {
+        Command::Status => ask::status(&connect()?, output),
+        Command::Rpc(rpc) => ask::rpc(&connect()?, rpc, output),
+        Command::Probe(probe) => probe::run(&connect()?, probe, output),
+        Command::Record(record) => record::run(&connect()?, record, output),
+        Command::Replay(replay) => replay::run(&connect()?, replay, output),
+        Command::Latency(latency) => latency::run(&connect()?, latency, output),
+        Command::Export(export) => export::run(&connect()?, export, output),
+    }
+}

@@ -1,0 +1,103 @@
+//! `status` and `rpc`.
+
+use anyhow::Context;
+use plica_client::Client;
+use plica_client::protocol::status::{Distribution, Status};
+use serde_json::Value;
+
+use crate::args::Rpc;
+use crate::output::Output;
+
+pub(crate) fn status(client: &Client, output: Output) -> anyhow::Result<()> {
+    let value = client.status_json()?;
+    let status: Status =
+        serde_json::from_value(value.clone()).context("the daemon's status has another shape")?;
+    output.result(&value, &table(&status));
+    Ok(())
+}
+
+pub(crate) fn rpc(client: &Client, rpc: &Rpc, output: Output) -> anyhow::Result<()> {
+    let arguments: Value = serde_json::from_str(&rpc.arguments).with_context(|| {
+        format!(
+            "`{}` is not JSON; quote it for the shell: '{{\"ticks\": 1}}'",
+            rpc.arguments
+        )
+    })?;
+    let reply = client.rpc(&rpc.method, &arguments)?;
+    output.result(&reply, &reply.to_string());
+    Ok(())
+}
+
+fn table(status: &Status) -> String {
+    let state = if status.paused { "paused" } else { "running" };
+    let mut lines = vec![
+        format!(
+            "scene {}, session {}, {state}, up {:.1} s",
+            status.scene, status.session, status.uptime_s
+        ),
+        format!(
+            "tick {} at {:.3} s, scheduling {:?}",
+            status.tick, status.sim_time_s, status.realtime.scheduling
+        ),
+        line("tick", &status.tick_us),
+    ];
+    lines.extend(
+        status
+            .stages
+            .iter()
+            .map(|(name, stage)| line(&format!("  {name}"), stage)),
+    );
+    lines.push(line("lateness", &status.lateness_us));
+    lines.push(format!(
+        "overruns {}, skipped ticks {}",
+        status.overruns, status.skipped_ticks
+    ));
+    for (name, object) in &status.objects {
+        let state = if object.sleeping { "sleeping" } else { "awake" };
+        lines.push(format!(
+            "object {name}: {} vertices, {state}, {} frames, worst penetration {:.4} mm",
+            object.n_vertices,
+            object.frames_published,
+            1e3 * object.max_penetration_m
+        ));
+    }
+    for (name, tool) in &status.tools {
+        let state = match (tool.pose_age_s, tool.stale, tool.in_contact) {
+            (None, ..) => "no pose yet",
+            (_, true, _) => "stale",
+            (_, _, true) => "in contact",
+            _ => "free",
+        };
+        let [x, y, z] = tool.force_n;
+        let accepted = tool.poses_accepted;
+        lines.push(format!(
+            "tool {name}: {state}, force [{x:.3}, {y:.3}, {z:.3}] N, {accepted} poses"
+        ));
+        lines.extend(
+            tool.poses_rejected
+                .iter()
+                .map(|(kind, n)| format!("  rejected {kind}: {n}")),
+        );
+    }
+    lines.extend(
+        status
+            .rejected
+            .iter()
+            .map(|(kind, n)| format!("rejected {kind}: {n}")),
+    );
+    lines.extend(
+        status
+            .realtime
+            .warnings
+            .iter()
+            .map(|warning| format!("warning: {warning}")),
+    );
+    lines.join("\n")
+}
+
+fn line(name: &str, d: &Distribution) -> String {
+    format!(
+        "{name:<16} p50 {:8.1}  p99 {:8.1}  p99.9 {:8.1}  max {:8.1} us",
+        d.p50, d.p99, d.p999, d.max
+    )
+}

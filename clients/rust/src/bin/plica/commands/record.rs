@@ -1,0 +1,96 @@
+//! `record`: what is published, into an MCAP file.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use anyhow::Context;
+use plica_client::recording::{Kind, Recorded, Recorder};
+use plica_client::{Client, RawMessage, SourceClock};
+use serde_json::json;
+
+use super::Stop;
+use crate::args::Record;
+use crate::output::{Output, progress};
+
+/// About two seconds of everything; a full queue drops what arrives, and says so.
+const WAITING: usize = 4096;
+const LOOK: Duration = Duration::from_millis(50);
+
+pub(crate) fn run(client: &Client, record: &Record, output: Output) -> anyhow::Result<()> {
+    let stop = Stop::on_signals()?;
+    let clock = SourceClock::new();
+    let mut recorder = Recorder::create(&record.out)?;
+    let messages = client.subscribe_raw(&keys(client, record), WAITING)?;
+    if client.status().is_err() {
+        output.note("no plicad serves this session; recording what others publish");
+    }
+    let bar = progress(None, "messages");
+    let start = Instant::now();
+    let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
+    let over = |now: Instant| {
+        record
+            .seconds
+            .is_some_and(|s| (now - start).as_secs_f64() >= s)
+            || stop.is_set()
+    };
+    while !over(Instant::now()) {
+        if let Some(message) = messages.next(LOOK) {
+            write(&mut recorder, message, clock, &mut counts)?;
+            bar.inc(1);
+        }
+    }
+    // What waits at the end belongs to the recording; what goes on arriving does not.
+    for message in std::iter::from_fn(|| messages.try_next()).take(WAITING) {
+        write(&mut recorder, message, clock, &mut counts)?;
+    }
+    recorder.finish()?;
+    bar.finish_and_clear();
+    let count = |kind: &str| counts.get(kind).copied().unwrap_or(0);
+    let (seconds, dropped) = (start.elapsed().as_secs_f64(), messages.stats().dropped);
+    let (poses, skins, wrenches) = (count("pose"), count("skin"), count("wrench"));
+    let value = json!({
+        "file": record.out, "seconds": seconds, "poses": poses, "skins": skins, "wrenches": wrenches, "dropped": dropped,
+    });
+    let file = record.out.display();
+    let text = format!(
+        "{file}: {poses} poses, {skins} skins, {wrenches} wrenches in {seconds:.1} s, {dropped} dropped"
+    );
+    output.result(&value, &text);
+    Ok(())
+}
+
+fn keys(client: &Client, record: &Record) -> Vec<String> {
+    let keys = client.keys();
+    let mut wanted = vec![keys.pose("*")];
+    wanted.extend(record.skins.then(|| keys.skin("*")));
+    wanted.extend(record.wrenches.then(|| keys.wrench("*")));
+    wanted
+}
+
+fn write(
+    recorder: &mut Recorder,
+    message: RawMessage,
+    clock: SourceClock,
+    counts: &mut BTreeMap<&'static str, u64>,
+) -> anyhow::Result<()> {
+    let RawMessage {
+        key,
+        bytes,
+        json,
+        received,
+    } = message;
+    let kind = Kind::of(&key, json).with_context(|| format!("unexpected key `{key}`"))?;
+    let name = match kind {
+        Kind::Pose | Kind::JsonPose => "pose",
+        Kind::Skin => "skin",
+        Kind::Wrench => "wrench",
+    };
+    *counts.entry(name).or_default() += 1;
+    recorder.write(&Recorded {
+        key,
+        kind,
+        log_time_ns: clock.at_ns(received),
+        bytes,
+    })?;
+    Ok(())
+}

@@ -1,0 +1,50 @@
+//! What a person and what a program reads.
+
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
+
+/// Text for people, or one JSON object as the last line of standard output; never both on standard output.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Output {
+    pub(crate) json: bool,
+}
+
+impl Output {
+    /// The end of a command.
+    pub(crate) fn result(self, value: &Value, text: &str) {
+        if self.json {
+            println!("{value}");
+        } else {
+            println!("{text}");
+        }
+    }
+
+    /// The end of a command that failed.
+    pub(crate) fn error(self, error: &anyhow::Error) {
+        eprintln!("plica: {error:#}");
+        if self.json {
+            println!("{}", json!({"error": format!("{error:#}")}));
+        }
+    }
+
+    /// A note that is not the result.
+    pub(crate) fn note(self, text: &str) {
+        eprintln!("plica: {text}");
+    }
+}
+
+/// A bar on standard error, shown on a terminal only; without a length it spins.
+pub(crate) fn progress(length: Option<u64>, unit: &str) -> ProgressBar {
+    let bar = length.map_or_else(ProgressBar::new_spinner, ProgressBar::new);
+    let template = match length {
+        Some(_) => format!("{{bar:40}} {{pos}}/{{len}} {unit} {{msg}}"),
+        None => format!("{{spinner}} {{pos}} {unit} {{msg}}"),
+    };
+    if let Ok(style) = ProgressStyle::with_template(&template) {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
+}

@@ -1,0 +1,176 @@
+//! The `plica` command: a replay is byte by byte what was recorded, and errors say what to do.
+#![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+mod common;
+
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use common::SmallDaemon;
+use plica_client::PoseSource;
+use plica_client::recording::{Recorded, read};
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn plica(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_plica"));
+    command
+        .args(arguments)
+        .arg("--json")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+fn last_line(output: &Output) -> Value {
+    let text = String::from_utf8_lossy(&output.stdout);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    serde_json::from_str(
+        text.lines()
+            .last()
+            .unwrap_or_else(|| panic!("no output; {errors}")),
+    )
+    .unwrap()
+}
+
+fn poses(path: &Path) -> Vec<Recorded> {
+    read(path).unwrap().map(Result::unwrap).collect()
+}
+
+/// Starts `plica record` and waits until it has subscribed.
+fn record(daemon: &SmallDaemon, path: &Path, seconds: &str) -> Child {
+    let path = path.to_str().unwrap();
+    let child = plica(&[
+        "record",
+        path,
+        "--seconds",
+        seconds,
+        "--connect",
+        &daemon.endpoint,
+    ])
+    .spawn()
+    .unwrap();
+    let deadline = Instant::now() + Duration::from_secs(10);
+    let publisher = zenoh::Wait::wait(
+        daemon
+            .session
+            .declare_publisher("plica/v1/main/tool/left/pose"),
+    )
+    .unwrap();
+    let listens = || {
+        zenoh::Wait::wait(publisher.matching_status())
+            .unwrap()
+            .matching()
+    };
+    while !listens() && Instant::now() < deadline {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    assert!(listens(), "the recorder never subscribed");
+    child
+}
+
+fn bytes_by_tool(messages: &[Recorded], tool: &str) -> Vec<Vec<u8>> {
+    messages
+        .iter()
+        .filter(|m| m.key.contains(tool))
+        .map(|m| m.bytes.clone())
+        .collect()
+}
+
+#[test]
+fn record_replay_record_gives_the_same_poses() {
+    // A daemon that subscribes to poses itself would hide whether the recorder does.
+    let daemon = SmallDaemon::silent();
+    let folder = TempDir::new().unwrap();
+    let (first, second) = (folder.path().join("1.mcap"), folder.path().join("2.mcap"));
+
+    let recorder = record(&daemon, &first, "2");
+    let client = daemon.client();
+    let (mut left, mut right) = (PoseSource::new(), PoseSource::new());
+    for n in 0..200 {
+        let at = f64::from(n) * 1e-3;
+        client
+            .publish_pose("left", &left.pose([at, 0.1, 0.2], [0.0, 0.0, 0.0, 0.999]))
+            .unwrap();
+        client
+            .publish_pose(
+                "right",
+                &right.pose([at / 3.0, 0.0, 0.0], [0.0, 0.0, 0.6, 0.8]),
+            )
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let result = last_line(&recorder.wait_with_output().unwrap());
+    assert_eq!(
+        (&result["poses"], &result["dropped"]),
+        (&400.into(), &0.into()),
+        "{result}"
+    );
+
+    let recorder = record(&daemon, &second, "2");
+    let path = first.to_str().unwrap();
+    let replay = plica(&[
+        "replay",
+        path,
+        "--speed",
+        "2",
+        "--connect",
+        &daemon.endpoint,
+    ])
+    .output()
+    .unwrap();
+    assert_eq!(
+        last_line(&replay)["poses"],
+        400,
+        "{}",
+        String::from_utf8_lossy(&replay.stderr)
+    );
+    recorder.wait_with_output().unwrap();
+
+    let (first, second) = (poses(&first), poses(&second));
+    assert_eq!((first.len(), second.len()), (400, 400));
+    for tool in ["/left/", "/right/"] {
+        assert_eq!(bytes_by_tool(&first, tool), bytes_by_tool(&second, tool));
+    }
+}
+
+#[test]
+fn a_missing_daemon_is_named_with_what_to_do() {
+    let output = plica(&["status", "--connect", "tcp/127.0.0.1:9"])
+        .output()
+        .unwrap();
+    assert!(!output.status.success());
+    let error = last_line(&output)["error"].as_str().unwrap().to_owned();
+    assert!(
+        error.starts_with("no plicad answered on tcp/127.0.0.1:9: start one with `plicad serve`"),
+        "{error}"
+    );
+}
+
+#[test]
+fn status_and_rpc_print_one_object() {
+    let daemon = SmallDaemon::start();
+    let ask = |arguments: &[&str]| {
+        last_line(
+            &plica(arguments)
+                .args(["--connect", &daemon.endpoint])
+                .output()
+                .unwrap(),
+        )
+    };
+    assert_eq!(ask(&["status"])["scene"], "small");
+    assert_eq!(ask(&["rpc", "step", r#"{"ticks": 3}"#])["tick"], 3);
+    assert!(
+        ask(&["rpc", "explode"])["error"]
+            .as_str()
+            .unwrap()
+            .starts_with("rpc_unknown: no method `explode`")
+    );
+    assert!(
+        ask(&["rpc", "step", "{ticks}"])["error"]
+            .as_str()
+            .unwrap()
+            .contains("is not JSON")
+    );
+}
