@@ -10,56 +10,31 @@ pub(crate) struct Fields<'a> {
 /// Checks magic, version and the `u16` length field (`header_bytes`), and stands behind them at offset 8.
 ///
 /// Errors in this order: too short, magic, version, length.
-pub(crate) fn open<'a>(
-    bytes: &'a [u8],
-    magic: [u8; 4],
-    header_bytes: usize,
-) -> Result<Fields<'a>, DecodeError> {
+pub(crate) fn open<'a>(bytes: &'a [u8], magic: [u8; 4], header_bytes: usize) -> Result<Fields<'a>, DecodeError> {
     if bytes.len() < header_bytes {
-        return Err(DecodeError::TooShort {
-            needed: header_bytes as u64,
-            got: bytes.len() as u64,
-        });
+        return Err(DecodeError::TooShort { needed: header_bytes as u64, got: bytes.len() as u64 });
     }
-    let mut fields = Fields {
-        rest: &bytes[..header_bytes],
-    };
+    let mut fields = Fields { rest: &bytes[..header_bytes] };
     let found = fields.take::<4>();
     if found != magic {
-        return Err(DecodeError::Magic {
-            found,
-            expected: magic,
-        });
+        return Err(DecodeError::Magic { found, expected: magic });
     }
     let version = u16::from_le_bytes(fields.take());
     if version != VERSION {
-        return Err(DecodeError::Version {
-            found: version,
-            expected: VERSION,
-        });
+        return Err(DecodeError::Version { found: version, expected: VERSION });
     }
     let declared = u16::from_le_bytes(fields.take());
     if usize::from(declared) != header_bytes {
-        return Err(DecodeError::Length {
-            expected: header_bytes as u64,
-            got: u64::from(declared),
-        });
+        return Err(DecodeError::Length { expected: header_bytes as u64, got: u64::from(declared) });
     }
     Ok(fields)
 }
 
 /// Like [`open`], for a message that is nothing but its header.
-pub(crate) fn open_exact<'a>(
-    bytes: &'a [u8],
-    magic: [u8; 4],
-    n_bytes: usize,
-) -> Result<Fields<'a>, DecodeError> {
+pub(crate) fn open_exact<'a>(bytes: &'a [u8], magic: [u8; 4], n_bytes: usize) -> Result<Fields<'a>, DecodeError> {
     let fields = open(bytes, magic, n_bytes)?;
     if bytes.len() != n_bytes {
-        return Err(DecodeError::Length {
-            expected: n_bytes as u64,
-            got: bytes.len() as u64,
-        });
+        return Err(DecodeError::Length { expected: n_bytes as u64, got: bytes.len() as u64 });
     }
     Ok(fields)
 }
@@ -103,14 +78,8 @@ pub(crate) struct Layout<const BYTES: usize> {
 impl<const BYTES: usize> Layout<BYTES> {
     /// Magic, version and length are written.
     pub(crate) fn new(magic: [u8; 4]) -> Self {
-        let mut layout = Self {
-            bytes: [0; BYTES],
-            at: 0,
-        };
-        layout
-            .put(magic)
-            .put(VERSION.to_le_bytes())
-            .put((BYTES as u16).to_le_bytes());
+        let mut layout = Self { bytes: [0; BYTES], at: 0 };
+        layout.put(magic).put(VERSION.to_le_bytes()).put((BYTES as u16).to_le_bytes());
         layout
     }
 
@@ -152,9 +121,5 @@ impl<const BYTES: usize> Layout<BYTES> {
 
 /// Refuses NaN and infinity.
 pub(crate) fn finite(field: &'static str, values: &[f64]) -> Result<(), DecodeError> {
-    if values.iter().all(|value| value.is_finite()) {
-        Ok(())
-    } else {
-        Err(DecodeError::NonFinite { field })
-    }
+    if values.iter().all(|value| value.is_finite()) { Ok(()) } else { Err(DecodeError::NonFinite { field }) }
 }

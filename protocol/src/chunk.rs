@@ -37,22 +37,14 @@ impl ChunkHeader {
 ///
 /// Other parameters are ignored. Errors with `bad_offset` if it is no number.
 pub fn offset_of(parameters: &str) -> Result<u64, ErrorReply> {
-    let value = parameters
-        .split(';')
-        .find_map(|pair| pair.strip_prefix("offset="));
-    value.map_or(Ok(0), |text| {
-        text.parse()
-            .map_err(|_| bad_offset(text, "a whole number of bytes is expected"))
-    })
+    let value = parameters.split(';').find_map(|pair| pair.strip_prefix("offset="));
+    value.map_or(Ok(0), |text| text.parse().map_err(|_| bad_offset(text, "a whole number of bytes is expected")))
 }
 
 /// The piece of `whole` from `offset` on. The end itself gives an empty piece; beyond it errors with `bad_offset`.
 pub fn piece(whole: &[u8], offset: u64) -> Result<&[u8], ErrorReply> {
-    let start = usize::try_from(offset)
-        .ok()
-        .filter(|start| *start <= whole.len());
-    let start = start
-        .ok_or_else(|| bad_offset(&offset.to_string(), &format!("the end is {}", whole.len())))?;
+    let start = usize::try_from(offset).ok().filter(|start| *start <= whole.len());
+    let start = start.ok_or_else(|| bad_offset(&offset.to_string(), &format!("the end is {}", whole.len())))?;
     Ok(&whole[start..whole.len().min(start + CHUNK_BYTES)])
 }
 

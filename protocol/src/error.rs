@@ -66,16 +66,8 @@ pub enum DecodeError {
 
 impl DecodeError {
     /// All names that [`DecodeError::kind`] can return.
-    pub const KINDS: [&'static str; 8] = [
-        "too_short",
-        "bad_magic",
-        "bad_version",
-        "bad_length",
-        "non_finite",
-        "not_unit",
-        "out_of_range",
-        "bad_json",
-    ];
+    pub const KINDS: [&'static str; 8] =
+        ["too_short", "bad_magic", "bad_version", "bad_length", "non_finite", "not_unit", "out_of_range", "bad_json"];
 
     /// The counter of the status message that this error belongs to.
     pub fn kind(&self) -> &'static str {

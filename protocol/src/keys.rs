@@ -19,9 +19,7 @@ pub fn check_name(name: &str) -> Result<(), NameError> {
     if (1..=MAX_NAME_BYTES).contains(&name.len()) && name.bytes().all(allowed) {
         Ok(())
     } else {
-        Err(NameError {
-            name: name.to_owned(),
-        })
+        Err(NameError { name: name.to_owned() })
     }
 }
 
@@ -40,9 +38,7 @@ impl Keys {
     /// The keys under `plica/v1/<session>`.
     pub fn new(session: &str) -> Result<Self, NameError> {
         check_name(session)?;
-        Ok(Self {
-            root: format!("{PREFIX}/{session}"),
-        })
+        Ok(Self { root: format!("{PREFIX}/{session}") })
     }
 
     /// `plica/v1/<session>`.
@@ -116,10 +112,7 @@ impl Keys {
     }
 
     fn middle<'k>(&self, key: &'k str, before: &str, after: &str) -> Option<&'k str> {
-        let name = key
-            .strip_prefix(&self.root)?
-            .strip_prefix(before)?
-            .strip_suffix(after)?;
+        let name = key.strip_prefix(&self.root)?.strip_prefix(before)?.strip_suffix(after)?;
         check_name(name).ok().map(|()| name)
     }
 }

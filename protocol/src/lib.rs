@@ -1,7 +1,8 @@
 //! The wire of Plica and nothing else: binary messages, keys, JSON types.
 //!
-//! `PROTOCOL.md` beside this crate is the same text for other languages. This crate knows bytes; it knows neither
-//! Zenoh nor simulation types. Decoding never panics, whatever the bytes, and never allocates for binary messages.
+//! `PROTOCOL.md` beside this crate is the same text for other languages. This crate knows bytes, and the rule of whose
+//! poses count ([`order`]); it knows neither Zenoh nor simulation types. Decoding never panics, whatever the bytes, and
+//! never allocates for binary messages.
 //!
 //! All binary messages are little-endian and start with four magic bytes, `u16 version` and a `u16` length: of the
 //! whole message for poses and wrenches, of the header for skin frames.
@@ -10,6 +11,7 @@ mod bytes;
 pub mod chunk;
 mod error;
 pub mod keys;
+pub mod order;
 pub mod pose;
 pub mod rpc;
 pub mod skin;

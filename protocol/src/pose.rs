@@ -88,8 +88,7 @@ impl Pose {
 
     /// Reads the JSON form and passes it through the gate.
     pub fn decode_json(bytes: &[u8]) -> Result<Self, DecodeError> {
-        let json: JsonPose =
-            serde_json::from_slice(bytes).map_err(|error| DecodeError::Json(error.to_string()))?;
+        let json: JsonPose = serde_json::from_slice(bytes).map_err(|error| DecodeError::Json(error.to_string()))?;
         json.to_pose()
     }
 
@@ -110,11 +109,7 @@ impl Pose {
         finite("grip", &[f64::from(self.grip)])?;
         let distance_m = norm(&self.position_m);
         if distance_m > MAX_POSITION_M {
-            return Err(DecodeError::OutOfRange {
-                field: "position",
-                value: distance_m,
-                limit: MAX_POSITION_M,
-            });
+            return Err(DecodeError::OutOfRange { field: "position", value: distance_m, limit: MAX_POSITION_M });
         }
         self.orientation_xyzw = normalised(self.orientation_xyzw)?;
         Ok(self)
@@ -131,11 +126,7 @@ fn normalised(q: [f64; 4]) -> Result<[f64; 4], DecodeError> {
         return Err(DecodeError::NotUnit { norm });
     }
     let unit_to_rounding = (norm - 1.0).abs() <= 4.0 * f64::EPSILON;
-    Ok(if unit_to_rounding {
-        q
-    } else {
-        q.map(|component| component / norm)
-    })
+    Ok(if unit_to_rounding { q } else { q.map(|component| component / norm) })
 }
 
 /// The JSON form of a pose; only `position` and `orientation` are required.

@@ -30,14 +30,7 @@ pub enum Method {
 
 impl Method {
     /// All methods.
-    pub const ALL: [Self; 6] = [
-        Self::Reset,
-        Self::Pause,
-        Self::Resume,
-        Self::Step,
-        Self::Snapshot,
-        Self::Restore,
-    ];
+    pub const ALL: [Self; 6] = [Self::Reset, Self::Pause, Self::Resume, Self::Step, Self::Snapshot, Self::Restore];
 
     /// The last part of the key.
     pub fn name(self) -> &'static str {
@@ -53,24 +46,17 @@ impl Method {
 
     /// The method of that name. Errors with `rpc_unknown`.
     pub fn parse(name: &str) -> Result<Self, ErrorReply> {
-        Self::ALL
-            .into_iter()
-            .find(|method| method.name() == name)
-            .ok_or_else(|| {
-                let known = Self::ALL.map(Self::name).join(", ");
-                ErrorReply::new(
-                    ErrorCode::RpcUnknown,
-                    format!("no method `{name}`; there are {known}"),
-                )
-            })
+        Self::ALL.into_iter().find(|method| method.name() == name).ok_or_else(|| {
+            let known = Self::ALL.map(Self::name).join(", ");
+            ErrorReply::new(ErrorCode::RpcUnknown, format!("no method `{name}`; there are {known}"))
+        })
     }
 }
 
 /// Reads a request. Errors with `rpc_malformed`.
 pub fn decode_request<T: DeserializeOwned>(payload: &[u8]) -> Result<T, ErrorReply> {
     let payload = if payload.is_empty() { b"{}" } else { payload };
-    serde_json::from_slice(payload)
-        .map_err(|error| ErrorReply::new(ErrorCode::RpcMalformed, error.to_string()))
+    serde_json::from_slice(payload).map_err(|error| ErrorReply::new(ErrorCode::RpcMalformed, error.to_string()))
 }
 
 /// `{}`: a method without arguments.
@@ -122,54 +108,15 @@ pub struct StepPose {
 impl StepPose {
     /// A pose for a tool.
     pub fn new(tool: &str, pose: &Pose) -> Self {
-        let JsonPose {
-            sequence,
-            source_time_ns,
-            source_id,
-            valid,
-            position,
-            orientation,
-            buttons,
-            grip,
-        } = pose.into();
+        let JsonPose { sequence, source_time_ns, source_id, valid, position, orientation, buttons, grip } = pose.into();
         let tool = tool.to_owned();
-        Self {
-            tool,
-            sequence,
-            source_time_ns,
-            source_id,
-            valid,
-            position,
-            orientation,
-            buttons,
-            grip,
-        }
+        Self { tool, sequence, source_time_ns, source_id, valid, position, orientation, buttons, grip }
     }
 
     /// The pose, passed through the gate of [`Pose::checked`].
     pub fn to_pose(&self) -> Result<Pose, DecodeError> {
-        let Self {
-            sequence,
-            source_time_ns,
-            source_id,
-            valid,
-            position,
-            orientation,
-            buttons,
-            grip,
-            ..
-        } = *self;
-        JsonPose {
-            sequence,
-            source_time_ns,
-            source_id,
-            valid,
-            position,
-            orientation,
-            buttons,
-            grip,
-        }
-        .to_pose()
+        let Self { sequence, source_time_ns, source_id, valid, position, orientation, buttons, grip, .. } = *self;
+        JsonPose { sequence, source_time_ns, source_id, valid, position, orientation, buttons, grip }.to_pose()
     }
 }
 
@@ -222,11 +169,7 @@ pub struct ErrorReply {
 impl ErrorReply {
     /// An error of a known code.
     pub fn new(code: ErrorCode, message: impl Into<String>) -> Self {
-        Self {
-            code: code.name().to_owned(),
-            message: message.into(),
-            retryable: code.retryable(),
-        }
+        Self { code: code.name().to_owned(), message: message.into(), retryable: code.retryable() }
     }
 
     /// The payload of the reply.

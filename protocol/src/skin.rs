@@ -174,59 +174,26 @@ pub fn encode_i16_into(
     check_lengths("rest", positions.len(), Some(rest.len()))?;
     check_lengths("normals", positions.len(), normals.map(<[_]>::len))?;
     let offset_m = |(p, r): (&[f32; 3], &[f32; 3])| [p[0] - r[0], p[1] - r[1], p[2] - r[2]];
-    let largest_m = positions
-        .iter()
-        .zip(rest)
-        .flat_map(offset_m)
-        .fold(0.0_f32, |most, d| most.max(d.abs()));
+    let largest_m = positions.iter().zip(rest).flat_map(offset_m).fold(0.0_f32, |most, d| most.max(d.abs()));
     let scale = largest_m / f32::from(i16::MAX);
     let header = complete(header, positions.len(), normals.is_some(), Some(scale));
     start(out, &header);
     let per_scale = if scale > 0.0 { scale.recip() } else { 0.0 };
-    positions
-        .iter()
-        .zip(rest)
-        .map(offset_m)
-        .for_each(|d| push_i16(out, d, per_scale));
-    normals
-        .unwrap_or_default()
-        .iter()
-        .for_each(|n| push_i16(out, *n, NORMAL_ONE));
+    positions.iter().zip(rest).map(offset_m).for_each(|d| push_i16(out, d, per_scale));
+    normals.unwrap_or_default().iter().for_each(|n| push_i16(out, *n, NORMAL_ONE));
     Ok(())
 }
 
-fn check_lengths(
-    array: &'static str,
-    expected: usize,
-    got: Option<usize>,
-) -> Result<(), EncodeError> {
+fn check_lengths(array: &'static str, expected: usize, got: Option<usize>) -> Result<(), EncodeError> {
     match got {
-        Some(got) if got != expected => Err(EncodeError {
-            array,
-            expected,
-            got,
-        }),
+        Some(got) if got != expected => Err(EncodeError { array, expected, got }),
         _ => Ok(()),
     }
 }
 
-fn complete(
-    header: &SkinHeader,
-    n_vertices: usize,
-    normals: bool,
-    scale: Option<f32>,
-) -> SkinHeader {
-    let flags = SkinFlags {
-        normals,
-        offsets_i16: scale.is_some(),
-        ..header.flags
-    };
-    SkinHeader {
-        n_vertices: n_vertices as u32,
-        flags,
-        scale: scale.unwrap_or(0.0),
-        ..*header
-    }
+fn complete(header: &SkinHeader, n_vertices: usize, normals: bool, scale: Option<f32>) -> SkinHeader {
+    let flags = SkinFlags { normals, offsets_i16: scale.is_some(), ..header.flags };
+    SkinHeader { n_vertices: n_vertices as u32, flags, scale: scale.unwrap_or(0.0), ..*header }
 }
 
 fn start(out: &mut Vec<u8>, header: &SkinHeader) {
@@ -265,20 +232,13 @@ impl<'a> SkinFrame<'a> {
         let header = SkinHeader::decode(bytes)?;
         let (expected, got) = (header.frame_bytes(), bytes.len() as u64);
         if got < expected {
-            return Err(DecodeError::TooShort {
-                needed: expected,
-                got,
-            });
+            return Err(DecodeError::TooShort { needed: expected, got });
         }
         if got > expected {
             return Err(DecodeError::Length { expected, got });
         }
         let (positions, normals) = bytes[HEADER_BYTES..].split_at(header.array_bytes() as usize);
-        Ok(Self {
-            header,
-            positions,
-            normals,
-        })
+        Ok(Self { header, positions, normals })
     }
 
     /// `[n][3]` in metres: world positions in the f32 format, offsets from rest in the 16-bit format.
@@ -325,28 +285,10 @@ impl<'a> SkinFrame<'a> {
 
 fn read_f32(bytes: &[u8]) -> Vec<[f32; 3]> {
     let component = |four: &[u8]| f32::from_le_bytes([four[0], four[1], four[2], four[3]]);
-    bytes
-        .chunks_exact(12)
-        .map(|v| {
-            [
-                component(&v[0..4]),
-                component(&v[4..8]),
-                component(&v[8..12]),
-            ]
-        })
-        .collect()
+    bytes.chunks_exact(12).map(|v| [component(&v[0..4]), component(&v[4..8]), component(&v[8..12])]).collect()
 }
 
 fn read_i16(bytes: &[u8], unit: f32) -> Vec<[f32; 3]> {
     let component = |two: &[u8]| f32::from(i16::from_le_bytes([two[0], two[1]])) * unit;
-    bytes
-        .chunks_exact(6)
-        .map(|v| {
-            [
-                component(&v[0..2]),
-                component(&v[2..4]),
-                component(&v[4..6]),
-            ]
-        })
-        .collect()
+    bytes.chunks_exact(6).map(|v| [component(&v[0..2]), component(&v[2..4]), component(&v[4..6])]).collect()
 }

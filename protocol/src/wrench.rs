@@ -63,12 +63,7 @@ impl WrenchFlags {
 
     /// Reads the `u32` of the wire; unknown bits are ignored.
     pub fn from_bits(bits: u32) -> Self {
-        Self {
-            in_contact: bits & 1 != 0,
-            sliding: bits & 2 != 0,
-            saturated: bits & 4 != 0,
-            stale: bits & 8 != 0,
-        }
+        Self { in_contact: bits & 1 != 0, sliding: bits & 2 != 0, saturated: bits & 4 != 0, stale: bits & 8 != 0 }
     }
 }
 

@@ -8,10 +8,7 @@ use plica_protocol::wrench::{self, Wrench, WrenchFlags};
 /// Hexadecimal digits, blanks ignored.
 fn hex(text: &str) -> Vec<u8> {
     let digits: Vec<u8> = text.bytes().filter(u8::is_ascii_hexdigit).collect();
-    digits
-        .chunks(2)
-        .map(|pair| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap())
-        .collect()
+    digits.chunks(2).map(|pair| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap()).collect()
 }
 
 fn a_pose() -> Pose {
@@ -29,12 +26,10 @@ fn a_pose() -> Pose {
 
 #[test]
 fn pose_has_its_96_bytes() {
-    let golden = hex(
-        "504c5053 0100 6000 0807060504030201 1817161514131211 24232221 01000000
+    let golden = hex("504c5053 0100 6000 0807060504030201 1817161514131211 24232221 01000000
          000000000000f03f 00000000000000c0 000000000000e03f
          0000000000000000 333333333333e33f 0000000000000000 9a9999999999e93f
-         34333231 0000803e",
-    );
+         34333231 0000803e");
     assert_eq!(golden.len(), pose::BYTES);
     assert_eq!(a_pose().encode().as_slice(), golden);
     assert_eq!(Pose::decode(&golden).unwrap(), a_pose());
@@ -50,10 +45,7 @@ fn pose_has_its_json() {
 #[test]
 fn json_pose_needs_position_and_orientation_only() {
     let shortest = br#"{"position": [0, 0, 0.1], "orientation": [0, 0, 0, 1]}"#;
-    let expected = Pose {
-        position_m: [0.0, 0.0, 0.1],
-        ..Pose::default()
-    };
+    let expected = Pose { position_m: [0.0, 0.0, 0.1], ..Pose::default() };
     assert_eq!(Pose::decode_json(shortest).unwrap(), expected);
 }
 
@@ -70,25 +62,18 @@ fn wrench_has_its_192_bytes() {
         contact_point_m: [7.0, 8.0, 9.0],
         proxy_position_m: [10.0, 11.0, 12.0],
         proxy_orientation_xyzw: [0.0, 0.0, 0.0, 1.0],
-        flags: WrenchFlags {
-            in_contact: true,
-            sliding: false,
-            saturated: true,
-            stale: true,
-        },
+        flags: WrenchFlags { in_contact: true, sliding: false, saturated: true, stale: true },
         n_contacts: 5,
         confidence: 0.75,
     };
-    let golden = hex(
-        "504c5752 0100 c000 0100000000000000 0200000000000000 000000000000e03f
+    let golden = hex("504c5752 0100 c000 0100000000000000 0200000000000000 000000000000e03f
          0300000000000000 0400000000000000
          000000000000f03f 0000000000000040 0000000000000840
          0000000000001040 0000000000001440 0000000000001840
          0000000000001c40 0000000000002040 0000000000002240
          0000000000002440 0000000000002640 0000000000002840
          0000000000000000 0000000000000000 0000000000000000 000000000000f03f
-         0d000000 05000000 0000403f 00000000",
-    );
+         0d000000 05000000 0000403f 00000000");
     assert_eq!(golden.len(), wrench::BYTES);
     assert_eq!(wrench.encode().as_slice(), golden);
     assert_eq!(Wrench::decode(&golden).unwrap(), wrench);
@@ -100,11 +85,7 @@ fn a_header() -> SkinHeader {
         tick: 2,
         sim_time_s: 0.5,
         newest_pose_source_time_ns: 3,
-        flags: SkinFlags {
-            enriched: true,
-            sleeping: true,
-            ..SkinFlags::default()
-        },
+        flags: SkinFlags { enriched: true, sleeping: true, ..SkinFlags::default() },
         confidence: 0.75,
         database_generation: 4,
         ..SkinHeader::default()
@@ -116,11 +97,9 @@ fn skin_in_f32_has_its_bytes() {
     let mut bytes = vec![0xff; 7];
     let normals = [[0.0, 0.0, 1.0]];
     skin::encode_f32_into(&mut bytes, &a_header(), &[[1.0, 2.0, -0.5]], Some(&normals)).unwrap();
-    let golden = hex(
-        "504c534b 0100 4000 0100000000000000 0200000000000000 000000000000e03f
+    let golden = hex("504c534b 0100 4000 0100000000000000 0200000000000000 000000000000e03f
          0300000000000000 01000000 0d000000 0000403f 04000000 00000000 00000000
-         0000803f 00000040 000000bf  00000000 00000000 0000803f",
-    );
+         0000803f 00000040 000000bf  00000000 00000000 0000803f");
     assert_eq!(bytes, golden);
     let frame = SkinFrame::decode(&bytes).unwrap();
     assert_eq!(frame.vectors(), [[1.0, 2.0, -0.5]]);
@@ -136,11 +115,9 @@ fn skin_in_16_bit_has_its_bytes() {
     let normals = [[0.0, 0.0, 1.0], [0.0, -1.0, 0.0]];
     let mut bytes = Vec::new();
     skin::encode_i16_into(&mut bytes, &a_header(), &positions, &rest, Some(&normals)).unwrap();
-    let golden = hex(
-        "504c534b 0100 4000 0100000000000000 0200000000000000 000000000000e03f
+    let golden = hex("504c534b 0100 4000 0100000000000000 0200000000000000 000000000000e03f
          0300000000000000 02000000 1d000000 0000403f 04000000 00008037 00000000
-         ff7f 0180 0000  0000 0100 0000   0000 0000 ff7f  0000 0180 0000",
-    );
+         ff7f 0180 0000  0000 0100 0000   0000 0000 ff7f  0000 0180 0000");
     assert_eq!(bytes, golden);
     let frame = SkinFrame::decode(&bytes).unwrap();
     assert_eq!(frame.positions_m(&rest).unwrap(), positions);
@@ -163,9 +140,6 @@ fn arrays_of_different_length_are_refused() {
     let (two, one) = ([[0.0; 3]; 2], [[0.0; 3]; 1]);
     let mut out = Vec::new();
     let error = skin::encode_f32_into(&mut out, &a_header(), &two, Some(&one)).unwrap_err();
-    assert_eq!(
-        error.to_string(),
-        "normals has 1 vertices, positions have 2"
-    );
+    assert_eq!(error.to_string(), "normals has 1 vertices, positions have 2");
     skin::encode_i16_into(&mut out, &a_header(), &two, &one, None).unwrap_err();
 }

@@ -23,45 +23,21 @@ fn keys_are_those_of_the_page() {
 #[test]
 fn keys_are_read_back() {
     let keys = Keys::new("main").unwrap();
-    assert_eq!(
-        keys.tool_of_pose("plica/v1/main/tool/probe/pose"),
-        Some("probe")
-    );
+    assert_eq!(keys.tool_of_pose("plica/v1/main/tool/probe/pose"), Some("probe"));
     assert_eq!(keys.tool_of_pose("plica/v1/other/tool/probe/pose"), None);
     assert_eq!(keys.tool_of_pose("plica/v1/main/tool/a/b/pose"), None);
     assert_eq!(keys.tool_of_pose("plica/v1/main/tool/*/pose"), None);
     assert_eq!(keys.tool_of_pose("plica/v1/main/tool/pose"), None);
-    assert_eq!(
-        keys.tool_of_wrench("plica/v1/main/tool/probe/wrench"),
-        Some("probe")
-    );
-    assert_eq!(
-        keys.object_of_skin("plica/v1/main/object/wedge/skin"),
-        Some("wedge")
-    );
-    assert_eq!(
-        keys.object_of_mesh("plica/v1/main/object/wedge/mesh"),
-        Some("wedge")
-    );
+    assert_eq!(keys.tool_of_wrench("plica/v1/main/tool/probe/wrench"), Some("probe"));
+    assert_eq!(keys.object_of_skin("plica/v1/main/object/wedge/skin"), Some("wedge"));
+    assert_eq!(keys.object_of_mesh("plica/v1/main/object/wedge/mesh"), Some("wedge"));
     assert_eq!(keys.method_of_rpc("plica/v1/main/rpc/step"), Some("step"));
-    assert!(
-        is_wildcard(&keys.rpc("*")) && is_wildcard("plica/**") && !is_wildcard(&keys.rpc("step"))
-    );
+    assert!(is_wildcard(&keys.rpc("*")) && is_wildcard("plica/**") && !is_wildcard(&keys.rpc("step")));
 }
 
 #[test]
 fn names_have_no_characters_that_mean_something_in_a_key() {
-    for bad in [
-        "",
-        "a/b",
-        "*",
-        "$*",
-        "a#",
-        "a?b",
-        "a b",
-        "ä",
-        &"x".repeat(65),
-    ] {
+    for bad in ["", "a/b", "*", "$*", "a#", "a?b", "a b", "ä", &"x".repeat(65)] {
         check_name(bad).unwrap_err();
         Keys::new(bad).unwrap_err();
     }
@@ -72,18 +48,9 @@ fn names_have_no_characters_that_mean_something_in_a_key() {
 fn step_takes_poses_as_json() {
     let json = br#"{"ticks": 3, "poses": [{"tool": "probe", "position": [0, 0, 0.1], "orientation": [0, 0, 0, 1]}]}"#;
     let request: StepRequest = decode_request(json).unwrap();
-    assert_eq!(
-        (request.ticks, request.poses[0].tool.as_str()),
-        (3, "probe")
-    );
+    assert_eq!((request.ticks, request.poses[0].tool.as_str()), (3, "probe"));
     let pose = request.poses[0].to_pose().unwrap();
-    assert_eq!(
-        pose,
-        Pose {
-            position_m: [0.0, 0.0, 0.1],
-            ..Pose::default()
-        }
-    );
+    assert_eq!(pose, Pose { position_m: [0.0, 0.0, 0.1], ..Pose::default() });
     assert_eq!(StepPose::new("probe", &pose), request.poses[0]);
     let sent = serde_json::to_vec(&request).unwrap();
     assert_eq!(decode_request::<StepRequest>(&sent).unwrap(), request);
@@ -91,30 +58,14 @@ fn step_takes_poses_as_json() {
 
 #[test]
 fn requests_of_another_shape_are_malformed() {
-    for bad in [
-        "{\"tick\": 1}",
-        "{}",
-        "[]",
-        "{\"ticks\": -1}",
-        "{\"ticks\": 1, \"poses\": [{}]}",
-        "x",
-    ] {
+    for bad in ["{\"tick\": 1}", "{}", "[]", "{\"ticks\": -1}", "{\"ticks\": 1, \"poses\": [{}]}", "x"] {
         let error = decode_request::<StepRequest>(bad.as_bytes()).unwrap_err();
-        assert_eq!(
-            (error.code.as_str(), error.retryable),
-            ("rpc_malformed", false),
-            "{bad}"
-        );
+        assert_eq!((error.code.as_str(), error.retryable), ("rpc_malformed", false), "{bad}");
     }
     decode_request::<EmptyRequest>(b"").unwrap();
     decode_request::<EmptyRequest>(b"{}").unwrap();
     decode_request::<EmptyRequest>(b"{\"now\": true}").unwrap_err();
-    assert_eq!(
-        decode_request::<RestoreRequest>(br#"{"id": "1"}"#)
-            .unwrap()
-            .id,
-        "1"
-    );
+    assert_eq!(decode_request::<RestoreRequest>(br#"{"id": "1"}"#).unwrap().id, "1");
 }
 
 #[test]
@@ -139,10 +90,7 @@ fn pieces_make_the_whole() {
     }
     assert_eq!(read, whole);
     assert!(piece(&whole, whole.len() as u64).unwrap().is_empty());
-    assert_eq!(
-        piece(&whole, whole.len() as u64 + 1).unwrap_err().code,
-        "bad_offset"
-    );
+    assert_eq!(piece(&whole, whole.len() as u64 + 1).unwrap_err().code, "bad_offset");
     assert_eq!(piece(&whole, u64::MAX).unwrap_err().code, "bad_offset");
 }
 
@@ -151,42 +99,20 @@ fn offsets_are_selector_parameters() {
     assert_eq!(offset_of("").unwrap(), 0);
     assert_eq!(offset_of("offset=524288").unwrap(), 524_288);
     assert_eq!(offset_of("_time=now;offset=7").unwrap(), 7);
-    for bad in [
-        "offset=",
-        "offset=-1",
-        "offset=1e3",
-        "offset=99999999999999999999",
-    ] {
+    for bad in ["offset=", "offset=-1", "offset=1e3", "offset=99999999999999999999"] {
         assert_eq!(offset_of(bad).unwrap_err().code, "bad_offset", "{bad}");
     }
-    let header = ChunkHeader {
-        total_bytes: 3,
-        offset: 0,
-        sha256: "00".repeat(32),
-    };
-    assert_eq!(
-        ChunkHeader::from_json(header.to_json().as_bytes()).unwrap(),
-        header
-    );
+    let header = ChunkHeader { total_bytes: 3, offset: 0, sha256: "00".repeat(32) };
+    assert_eq!(ChunkHeader::from_json(header.to_json().as_bytes()).unwrap(), header);
 }
 
 #[test]
 fn status_reads_older_and_newer_daemons() {
-    let status: Status =
-        serde_json::from_str(r#"{"tick": 7, "realtime": {"scheduling": "fifo"}, "new": 1}"#)
-            .unwrap();
+    let status: Status = serde_json::from_str(r#"{"tick": 7, "realtime": {"scheduling": "fifo"}, "new": 1}"#).unwrap();
     assert_eq!(status.tick, 7);
     let json = serde_json::to_string(&Status::default()).unwrap();
-    assert_eq!(
-        serde_json::from_str::<Status>(&json).unwrap(),
-        Status::default()
-    );
-    for key in [
-        "\"scheduling\":\"normal\"",
-        "\"tick_us\":{\"count\":0",
-        "\"jobs\":[]",
-        "\"drops\":{\"wrenches\":0",
-    ] {
+    assert_eq!(serde_json::from_str::<Status>(&json).unwrap(), Status::default());
+    for key in ["\"scheduling\":\"normal\"", "\"tick_us\":{\"count\":0", "\"jobs\":[]", "\"drops\":{\"wrenches\":0"] {
         assert!(json.contains(key), "{key} in {json}");
     }
 }

@@ -18,13 +18,7 @@ fn kind<T: std::fmt::Debug>(result: Result<T, DecodeError>) -> &'static str {
 fn a_skin() -> Vec<u8> {
     let mut bytes = Vec::new();
     let header = SkinHeader::default();
-    skin::encode_f32_into(
-        &mut bytes,
-        &header,
-        &[[1.0, 2.0, 3.0]; 3],
-        Some(&[[0.0, 0.0, 1.0]; 3]),
-    )
-    .unwrap();
+    skin::encode_f32_into(&mut bytes, &header, &[[1.0, 2.0, 3.0]; 3], Some(&[[0.0, 0.0, 1.0]; 3])).unwrap();
     bytes
 }
 
@@ -34,35 +28,17 @@ fn pose_kind(pose: Pose) -> &'static str {
 
 #[test]
 fn truncated_at_every_length() {
-    let (pose, wrench, skin) = (
-        Pose::default().encode(),
-        Wrench::default().encode(),
-        a_skin(),
-    );
-    (0..pose.len())
-        .for_each(|n| assert_eq!(kind(Pose::decode(&pose[..n])), "too_short", "{n} bytes"));
-    (0..wrench.len())
-        .for_each(|n| assert_eq!(kind(Wrench::decode(&wrench[..n])), "too_short", "{n} bytes"));
-    (0..skin.len()).for_each(|n| {
-        assert_eq!(
-            kind(SkinFrame::decode(&skin[..n])),
-            "too_short",
-            "{n} bytes"
-        )
-    });
+    let (pose, wrench, skin) = (Pose::default().encode(), Wrench::default().encode(), a_skin());
+    (0..pose.len()).for_each(|n| assert_eq!(kind(Pose::decode(&pose[..n])), "too_short", "{n} bytes"));
+    (0..wrench.len()).for_each(|n| assert_eq!(kind(Wrench::decode(&wrench[..n])), "too_short", "{n} bytes"));
+    (0..skin.len()).for_each(|n| assert_eq!(kind(SkinFrame::decode(&skin[..n])), "too_short", "{n} bytes"));
 }
 
 #[test]
 fn one_byte_too_many() {
     let longer = |bytes: &[u8]| [bytes, &[0]].concat();
-    assert_eq!(
-        kind(Pose::decode(&longer(&Pose::default().encode()))),
-        "bad_length"
-    );
-    assert_eq!(
-        kind(Wrench::decode(&longer(&Wrench::default().encode()))),
-        "bad_length"
-    );
+    assert_eq!(kind(Pose::decode(&longer(&Pose::default().encode()))), "bad_length");
+    assert_eq!(kind(Wrench::decode(&longer(&Wrench::default().encode()))), "bad_length");
     assert_eq!(kind(SkinFrame::decode(&longer(&a_skin()))), "bad_length");
 }
 
@@ -71,12 +47,8 @@ type Decode = fn(&[u8]) -> &'static str;
 #[test]
 fn every_bit_of_the_first_eight_bytes_counts() {
     let messages: [(Vec<u8>, Decode); 3] = [
-        (Pose::default().encode().to_vec(), |bytes| {
-            kind(Pose::decode(bytes))
-        }),
-        (Wrench::default().encode().to_vec(), |bytes| {
-            kind(Wrench::decode(bytes))
-        }),
+        (Pose::default().encode().to_vec(), |bytes| kind(Pose::decode(bytes))),
+        (Wrench::default().encode().to_vec(), |bytes| kind(Wrench::decode(bytes))),
         (a_skin(), |bytes| kind(SkinFrame::decode(bytes))),
     ];
     for (message, decode) in messages {
@@ -92,39 +64,15 @@ fn every_bit_of_the_first_eight_bytes_counts() {
 #[test]
 fn the_gate_of_poses() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        assert_eq!(
-            pose_kind(Pose {
-                position_m: [0.0, bad, 0.0],
-                ..Pose::default()
-            }),
-            "non_finite"
-        );
-        assert_eq!(
-            pose_kind(Pose {
-                orientation_xyzw: [0.0, 0.0, bad, 1.0],
-                ..Pose::default()
-            }),
-            "non_finite"
-        );
-        assert_eq!(
-            pose_kind(Pose {
-                grip: bad as f32,
-                ..Pose::default()
-            }),
-            "non_finite"
-        );
+        assert_eq!(pose_kind(Pose { position_m: [0.0, bad, 0.0], ..Pose::default() }), "non_finite");
+        assert_eq!(pose_kind(Pose { orientation_xyzw: [0.0, 0.0, bad, 1.0], ..Pose::default() }), "non_finite");
+        assert_eq!(pose_kind(Pose { grip: bad as f32, ..Pose::default() }), "non_finite");
     }
-    let at = |x: f64| Pose {
-        position_m: [x, 0.0, 0.0],
-        ..Pose::default()
-    };
+    let at = |x: f64| Pose { position_m: [x, 0.0, 0.0], ..Pose::default() };
     assert_eq!(pose_kind(at(1000.1)), "out_of_range");
     assert_eq!(pose_kind(at(-1e300)), "out_of_range");
     assert_eq!(Pose::decode(&at(-1000.0).encode()).unwrap(), at(-1000.0));
-    let turned = |w: f64| Pose {
-        orientation_xyzw: [0.0, 0.0, 0.0, w],
-        ..Pose::default()
-    };
+    let turned = |w: f64| Pose { orientation_xyzw: [0.0, 0.0, 0.0, w], ..Pose::default() };
     assert_eq!(pose_kind(turned(0.0)), "not_unit");
     assert_eq!(pose_kind(turned(0.989)), "not_unit");
     assert_eq!(pose_kind(turned(1.011)), "not_unit");
@@ -170,12 +118,7 @@ fn json_poses_of_another_shape() {
         br#"{"position": [0, 0, 0], "orientation": [0, 0, 0, 1], "orientaton": 1}"#,
     ];
     for json in bad {
-        assert_eq!(
-            kind(Pose::decode_json(json)),
-            "bad_json",
-            "{}",
-            String::from_utf8_lossy(json)
-        );
+        assert_eq!(kind(Pose::decode_json(json)), "bad_json", "{}", String::from_utf8_lossy(json));
     }
     let far = br#"{"position": [0, 0, 1e4], "orientation": [0, 0, 0, 1]}"#;
     assert_eq!(kind(Pose::decode_json(far)), "out_of_range");

@@ -1,0 +1,126 @@
+//! Which poses of a tool count: order within a source, and who may take over.
+//!
+//! One [`SourceOrder`] per tool. Time is given by the caller, so that the rule is the same under a real clock and in
+//! lock-step.
+
+use crate::pose::Pose;
+
+/// Why a well-formed pose is not used. [`Refusal::kind`] is the name under which the status counts it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Refusal {
+    /// The tracker says that it does not see the tool.
+    Invalid,
+    /// The sequence of this source was there before.
+    Repeated,
+    /// A later sequence of this source was there before.
+    OutOfOrder,
+    /// Another source holds the tool and is not stale.
+    Conflict,
+}
+
+impl Refusal {
+    /// The counter of the status message.
+    pub fn kind(self) -> &'static str {
+        match self {
+            Self::Invalid => "invalid",
+            Self::Repeated => "repeated",
+            Self::OutOfOrder => "out_of_order",
+            Self::Conflict => "conflict",
+        }
+    }
+}
+
+/// Who holds a tool, and how far it has come.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SourceOrder {
+    holder: Option<Holder>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Holder {
+    source_id: u32,
+    sequence: u64,
+    taken_at_s: f64,
+}
+
+impl SourceOrder {
+    /// Takes a pose that arrives at `now_s`, or says why not; a refused pose changes nothing.
+    ///
+    /// The holder is stale once its last pose was taken more than `stale_after_s` ago. Then the next valid pose is
+    /// taken, whatever its source and sequence. A pose with sequence 0 is unnumbered: it is judged by source only.
+    pub fn take(&mut self, pose: &Pose, now_s: f64, stale_after_s: f64) -> Result<(), Refusal> {
+        if !pose.valid {
+            return Err(Refusal::Invalid);
+        }
+        let fresh = self.holder.filter(|holder| now_s - holder.taken_at_s <= stale_after_s);
+        match fresh {
+            Some(holder) if holder.source_id != pose.source_id => return Err(Refusal::Conflict),
+            Some(holder) => holder.judge(pose.sequence)?,
+            None => {}
+        }
+        let Pose { source_id, sequence, .. } = *pose;
+        // An unnumbered pose between numbered ones does not forget how far they had come.
+        let sequence = fresh.map_or(sequence, |holder| holder.sequence.max(sequence));
+        self.holder = Some(Holder { source_id, sequence, taken_at_s: now_s });
+        Ok(())
+    }
+
+    /// Forgets the holder: the next valid pose of anyone is taken (`rpc/reset`).
+    pub fn forget(&mut self) {
+        self.holder = None;
+    }
+}
+
+impl Holder {
+    fn judge(&self, sequence: u64) -> Result<(), Refusal> {
+        match sequence {
+            0 => Ok(()),
+            same if same == self.sequence => Err(Refusal::Repeated),
+            older if older < self.sequence => Err(Refusal::OutOfOrder),
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pose(source_id: u32, sequence: u64) -> Pose {
+        Pose { source_id, sequence, ..Pose::default() }
+    }
+
+    #[test]
+    fn order_within_a_source() {
+        let mut order = SourceOrder::default();
+        let mut take = |sequence| order.take(&pose(1, sequence), 0.0, 0.1);
+        assert_eq!(take(5), Ok(()));
+        assert_eq!(take(5), Err(Refusal::Repeated));
+        assert_eq!(take(4), Err(Refusal::OutOfOrder));
+        assert_eq!(take(0), Ok(()));
+        assert_eq!(take(5), Err(Refusal::Repeated));
+        assert_eq!(take(9), Ok(()));
+    }
+
+    #[test]
+    fn another_source_waits_until_the_first_is_stale() {
+        let mut order = SourceOrder::default();
+        assert_eq!(order.take(&pose(1, 100), 0.0, 0.1), Ok(()));
+        assert_eq!(order.take(&pose(2, 1), 0.05, 0.1), Err(Refusal::Conflict));
+        assert_eq!(order.take(&pose(2, 2), 0.2, 0.1), Ok(()));
+        assert_eq!(order.take(&pose(1, 101), 0.21, 0.1), Err(Refusal::Conflict));
+        // The same source may also start anew, for instance a replay that is played again.
+        assert_eq!(order.take(&pose(2, 1), 0.5, 0.1), Ok(()));
+        order.forget();
+        assert_eq!(order.take(&pose(3, 1), 0.5, 0.1), Ok(()));
+    }
+
+    #[test]
+    fn poses_marked_invalid_hold_nothing() {
+        let mut order = SourceOrder::default();
+        let unseen = Pose { valid: false, ..pose(1, 7) };
+        assert_eq!(order.take(&unseen, 0.0, 0.1), Err(Refusal::Invalid));
+        assert_eq!(order.take(&pose(2, 1), 0.0, 0.1), Ok(()));
+        assert_eq!(Refusal::Invalid.kind(), "invalid");
+    }
+}
