@@ -145,7 +145,7 @@ pub struct ToolStatus {
     pub in_contact: bool,
     /// Number of active contacts.
     pub n_contacts: u32,
-    /// Force on the tool [N], world frame.
+    /// Force on the tool in newtons, world frame.
     pub force_n: [f64; 3],
     /// Whether the coupling is at its limit.
     pub saturated: bool,

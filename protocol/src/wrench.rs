@@ -21,13 +21,13 @@ pub struct Wrench {
     pub pose_sequence: u64,
     /// Source time of the pose that was used, echoed so that a client measures motion-to-force on its own clock.
     pub pose_source_time_ns: u64,
-    /// Force on the tool [N].
+    /// Force on the tool in newtons.
     pub force_n: [f64; 3],
-    /// Torque on the tool about the proxy's origin [N m].
+    /// Torque on the tool about the proxy's origin in newton metres.
     pub torque_n_m: [f64; 3],
-    /// Contact point [m]; zero without contact.
+    /// Contact point in metres; after release the last one, zero before the first contact.
     pub contact_point_m: [f64; 3],
-    /// Position of the proxy, where the simulated tool is [m].
+    /// Position of the proxy, where the simulated tool is, in metres.
     pub proxy_position_m: [f64; 3],
     /// Orientation of the proxy, `x y z w`.
     pub proxy_orientation_xyzw: [f64; 4],

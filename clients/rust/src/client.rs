@@ -26,10 +26,7 @@ pub struct Client {
 
 impl std::fmt::Debug for Client {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Client")
-            .field("place", &self.place)
-            .field("root", &self.keys.root())
-            .finish_non_exhaustive()
+        f.debug_struct("Client").field("place", &self.place).field("root", &self.keys.root()).finish_non_exhaustive()
     }
 }
 
@@ -42,18 +39,9 @@ impl Client {
         let config = options.zenoh_config()?;
         let session = zenoh::open(config)
             .wait()
-            .map_err(|error| ClientError::Connect {
-                place: options.place(),
-                message: error.to_string(),
-            })?;
+            .map_err(|error| ClientError::Connect { place: options.place(), message: error.to_string() })?;
         let publishers = Mutex::new(HashMap::new());
-        Ok(Self {
-            session,
-            keys,
-            place: options.place(),
-            timeout: options.timeout,
-            publishers,
-        })
+        Ok(Self { session, keys, place: options.place(), timeout: options.timeout, publishers })
     }
 
     /// The keys of this session.
@@ -68,10 +56,7 @@ impl Client {
 
     /// Publishes one pose. For a stream, [`Client::pose_publisher`] saves the look-up.
     pub fn publish_pose(&self, tool: &str, pose: &Pose) -> Result<(), ClientError> {
-        let mut publishers = self
-            .publishers
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut publishers = self.publishers.lock().unwrap_or_else(PoisonError::into_inner);
         if !publishers.contains_key(tool) {
             publishers.insert(tool.to_owned(), self.pose_publisher(tool)?);
         }
@@ -96,10 +81,7 @@ impl Client {
 
 impl Drop for Client {
     fn drop(&mut self) {
-        self.publishers
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clear();
+        self.publishers.lock().unwrap_or_else(PoisonError::into_inner).clear();
         close_within(self.session.clone(), CLOSE_TIMEOUT);
     }
 }
@@ -107,13 +89,11 @@ impl Drop for Client {
 /// Closes on a helper thread, which is left behind if it takes longer than `timeout`.
 fn close_within(session: Session, timeout: Duration) {
     let (done, closed) = mpsc::channel();
-    let closing = thread::Builder::new()
-        .name("plica-close".to_owned())
-        .spawn(move || {
-            // An error here means that the link is gone already.
-            let _ = session.close().wait();
-            let _ = done.send(());
-        });
+    let closing = thread::Builder::new().name("plica-close".to_owned()).spawn(move || {
+        // An error here means that the link is gone already.
+        let _ = session.close().wait();
+        let _ = done.send(());
+    });
     if closing.is_ok() {
         let _ = closed.recv_timeout(timeout);
     }

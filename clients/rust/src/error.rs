@@ -30,9 +30,7 @@ pub enum ClientError {
     #[error(transparent)]
     Name(#[from] NameError),
     /// The bus is there, but nobody serves that key.
-    #[error(
-        "nobody on {place} serves `{key}`: start `plicad serve`, or check the session and the names in its scene"
-    )]
+    #[error("nobody on {place} serves `{key}`: start `plicad serve`, or check the session and the names in its scene")]
     NoAnswer {
         /// Endpoint or configuration file.
         place: String,

@@ -18,14 +18,7 @@ pub enum MeshError {
 /// The root node of the GLB turns them to glTF's y up; its transform is not applied here.
 pub fn rest_positions(glb: &[u8]) -> Result<Vec<[f32; 3]>, MeshError> {
     let gltf = gltf::Gltf::from_slice(glb).map_err(Box::new)?;
-    let primitive = gltf
-        .meshes()
-        .flat_map(|mesh| mesh.primitives())
-        .next()
-        .ok_or(MeshError::Empty)?;
-    let positions = primitive
-        .reader(|_| gltf.blob.as_deref())
-        .read_positions()
-        .ok_or(MeshError::Empty)?;
+    let primitive = gltf.meshes().flat_map(|mesh| mesh.primitives()).next().ok_or(MeshError::Empty)?;
+    let positions = primitive.reader(|_| gltf.blob.as_deref()).read_positions().ok_or(MeshError::Empty)?;
     Ok(positions.collect())
 }

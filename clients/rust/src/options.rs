@@ -43,10 +43,7 @@ impl ClientOptions {
 
     /// Client mode, one endpoint, no scouting; or what the file says.
     pub(crate) fn zenoh_config(&self) -> Result<Config, ClientError> {
-        let fault = |error: zenoh::Error| ClientError::Config {
-            place: self.place(),
-            message: error.to_string(),
-        };
+        let fault = |error: zenoh::Error| ClientError::Config { place: self.place(), message: error.to_string() };
         if let Some(file) = &self.config_file {
             return Config::from_file(file).map_err(fault);
         }

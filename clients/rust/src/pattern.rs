@@ -5,17 +5,17 @@ use std::f64::consts::TAU;
 /// Where and how far a scripted tool moves. The tool's z axis points up, its origin is the centre of its tip.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Path {
-    /// Point on the surface under which the tool presses [m].
+    /// Point on the surface under which the tool presses, in metres.
     pub surface_m: [f64; 3],
-    /// Radius of the tip: how far its origin is above the surface at first touch [m].
+    /// Radius of the tip: how far its origin is above the surface at first touch, in metres.
     pub tip_radius_m: f64,
-    /// How deep the tip presses [m].
+    /// How deep the tip presses, in metres.
     pub depth_m: f64,
-    /// How far above first touch the tip starts [m].
+    /// How far above first touch the tip starts, in metres.
     pub clearance_m: f64,
-    /// Length of a slide, diameter of a circle [m].
+    /// Length of a slide, diameter of a circle, in metres.
     pub span_m: f64,
-    /// Duration of one cycle [s].
+    /// Duration of one cycle, in seconds.
     pub period_s: f64,
 }
 
@@ -42,18 +42,10 @@ impl Pattern {
         let along = ((phase - 0.25) / 0.5).clamp(0.0, 1.0);
         let [lower, x, y] = match self {
             Self::Press => [0.5 - 0.5 * (TAU * phase).cos(), 0.0, 0.0],
-            Self::Slide => [
-                plateau(phase),
-                0.5 * path.span_m * (TAU * smoothstep(along)).sin(),
-                0.0,
-            ],
+            Self::Slide => [plateau(phase), 0.5 * path.span_m * (TAU * smoothstep(along)).sin(), 0.0],
             Self::Circle => {
                 let (sin, cos) = (TAU * smoothstep(along)).sin_cos();
-                [
-                    plateau(phase),
-                    0.5 * path.span_m * cos,
-                    0.5 * path.span_m * sin,
-                ]
+                [plateau(phase), 0.5 * path.span_m * cos, 0.5 * path.span_m * sin]
             }
         };
         let top_m = path.surface_m[2] + path.tip_radius_m + path.clearance_m;
@@ -87,16 +79,10 @@ mod tests {
     #[test]
     fn all_start_above_and_press_in_the_middle() {
         for pattern in [Pattern::Press, Pattern::Slide, Pattern::Circle] {
-            let (start, middle) = (
-                pattern.position_m(&PATH, 0.0),
-                pattern.position_m(&PATH, 1.0),
-            );
+            let (start, middle) = (pattern.position_m(&PATH, 0.0), pattern.position_m(&PATH, 1.0));
             assert!((start[2] - 0.052).abs() < 1e-12, "{pattern:?} {start:?}");
             assert!((middle[2] - 0.027).abs() < 1e-12, "{pattern:?} {middle:?}");
-            assert!(
-                (pattern.position_m(&PATH, 2.5)[2] - pattern.position_m(&PATH, 0.5)[2]).abs()
-                    < 1e-12
-            );
+            assert!((pattern.position_m(&PATH, 2.5)[2] - pattern.position_m(&PATH, 0.5)[2]).abs() < 1e-12);
         }
     }
 
@@ -104,8 +90,7 @@ mod tests {
     fn none_jumps() {
         for pattern in [Pattern::Press, Pattern::Slide, Pattern::Circle] {
             for step in 0..4000 {
-                let [a, b] =
-                    [step, step + 1].map(|n| pattern.position_m(&PATH, f64::from(n) * 1e-3));
+                let [a, b] = [step, step + 1].map(|n| pattern.position_m(&PATH, f64::from(n) * 1e-3));
                 let moved_m = (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt();
                 assert!(moved_m < 2e-4, "{pattern:?} moves {moved_m} m in 1 ms");
             }

@@ -18,16 +18,8 @@ pub struct PosePublisher {
 }
 
 impl PosePublisher {
-    pub(crate) fn declare(
-        session: &Session,
-        key: String,
-        lossless: bool,
-    ) -> Result<Self, ClientError> {
-        let congestion = if lossless {
-            CongestionControl::Block
-        } else {
-            CongestionControl::Drop
-        };
+    pub(crate) fn declare(session: &Session, key: String, lossless: bool) -> Result<Self, ClientError> {
+        let congestion = if lossless { CongestionControl::Block } else { CongestionControl::Drop };
         let publisher = session
             .declare_publisher(key)
             .congestion_control(congestion)
@@ -46,11 +38,7 @@ impl PosePublisher {
     /// Sends bytes as they are, marked as JSON or as binary. Nothing is checked.
     pub fn publish_bytes(&self, bytes: Vec<u8>, json: bool) -> Result<(), ClientError> {
         let encoding = Encoding::from(if json { ENCODING_JSON } else { ENCODING_BYTES });
-        self.publisher
-            .put(bytes)
-            .encoding(encoding)
-            .wait()
-            .map_err(ClientError::bus)
+        self.publisher.put(bytes).encoding(encoding).wait().map_err(ClientError::bus)
     }
 }
 
@@ -64,13 +52,8 @@ pub struct SourceClock {
 impl SourceClock {
     /// Starts a clock.
     pub fn new() -> Self {
-        let since_1970 = SystemTime::now()
-            .duration_since(UNIX_EPOCH)
-            .unwrap_or_default();
-        Self {
-            start: Instant::now(),
-            start_unix_ns: since_1970.as_nanos() as u64,
-        }
+        let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        Self { start: Instant::now(), start_unix_ns: since_1970.as_nanos() as u64 }
     }
 
     /// Now, in nanoseconds.
@@ -104,26 +87,14 @@ impl PoseSource {
     pub fn new() -> Self {
         // The standard library seeds each hasher at random.
         let source_id = RandomState::new().hash_one(0_u8) as u32;
-        Self {
-            source_id,
-            clock: SourceClock::new(),
-            sequence: 0,
-        }
+        Self { source_id, clock: SourceClock::new(), sequence: 0 }
     }
 
     /// The next pose. `position_m` in metres, `orientation_xyzw` a unit quaternion.
     pub fn pose(&mut self, position_m: [f64; 3], orientation_xyzw: [f64; 4]) -> Pose {
         self.sequence += 1;
-        let (sequence, source_time_ns, source_id) =
-            (self.sequence, self.clock.now_ns(), self.source_id);
-        Pose {
-            sequence,
-            source_time_ns,
-            source_id,
-            position_m,
-            orientation_xyzw,
-            ..Pose::default()
-        }
+        let (sequence, source_time_ns, source_id) = (self.sequence, self.clock.now_ns(), self.source_id);
+        Pose { sequence, source_time_ns, source_id, position_m, orientation_xyzw, ..Pose::default() }
     }
 
     /// The clock that times the poses.

@@ -44,15 +44,10 @@ impl Client {
     }
 
     /// Calls a method with typed arguments and a typed reply (see `protocol::rpc`).
-    pub fn call<Q: Serialize, R: DeserializeOwned>(
-        &self,
-        method: &str,
-        request: &Q,
-    ) -> Result<R, ClientError> {
+    pub fn call<Q: Serialize, R: DeserializeOwned>(&self, method: &str, request: &Q) -> Result<R, ClientError> {
         check_name(method)?;
         let key = self.keys.rpc(method);
-        let json =
-            serde_json::to_vec(request).map_err(|error| ClientError::Bus(error.to_string()))?;
+        let json = serde_json::to_vec(request).map_err(|error| ClientError::Bus(error.to_string()))?;
         let reply = self.ask(&key, Some(json))?;
         parse_json(&key, &reply.payload().to_bytes())
     }
@@ -84,10 +79,7 @@ impl Client {
             let reply = self.ask(&format!("{key}?offset={}", whole.len()), None)?;
             let piece = reply.payload().to_bytes();
             let header = chunk_header(key, &reply)?;
-            if announced
-                .as_ref()
-                .is_some_and(|first| first.sha256 != header.sha256)
-            {
+            if announced.as_ref().is_some_and(|first| first.sha256 != header.sha256) {
                 // It was replaced on the way: start again.
                 whole.clear();
                 announced = None;
@@ -113,17 +105,12 @@ impl Client {
         match replies.recv_timeout(self.timeout + GRACE) {
             Ok(Some(reply)) => self.accept(selector, reply),
             Ok(None) => Err(self.timed_out(selector)),
-            Err(_) => Err(ClientError::NoAnswer {
-                place: self.place.clone(),
-                key: key_of(selector),
-            }),
+            Err(_) => Err(ClientError::NoAnswer { place: self.place.clone(), key: key_of(selector) }),
         }
     }
 
     fn accept(&self, selector: &str, reply: Reply) -> Result<Sample, ClientError> {
-        reply
-            .into_result()
-            .map_err(|error| self.refusal(selector, &error))
+        reply.into_result().map_err(|error| self.refusal(selector, &error))
     }
 
     fn refusal(&self, selector: &str, error: &ReplyError) -> ClientError {
@@ -136,10 +123,7 @@ impl Client {
     }
 
     fn timed_out(&self, selector: &str) -> ClientError {
-        ClientError::TimedOut {
-            key: key_of(selector),
-            timeout: self.timeout,
-        }
+        ClientError::TimedOut { key: key_of(selector), timeout: self.timeout }
     }
 }
 
@@ -151,57 +135,30 @@ fn parse_json<T: DeserializeOwned>(key: &str, bytes: &[u8]) -> Result<T, ClientE
     let malformed = |error: serde_json::Error| DecodeError::Json(error.to_string());
     serde_json::from_slice(bytes)
         .map_err(malformed)
-        .map_err(|source| ClientError::Malformed {
-            key: key.to_owned(),
-            source,
-        })
+        .map_err(|source| ClientError::Malformed { key: key.to_owned(), source })
 }
 
 fn chunk_header(key: &str, reply: &Sample) -> Result<ChunkHeader, ClientError> {
-    let attachment = reply
-        .attachment()
-        .map(|bytes| bytes.to_bytes().into_owned())
-        .unwrap_or_default();
-    ChunkHeader::from_json(&attachment).map_err(|source| ClientError::Malformed {
-        key: key.to_owned(),
-        source,
-    })
+    let attachment = reply.attachment().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default();
+    ChunkHeader::from_json(&attachment).map_err(|source| ClientError::Malformed { key: key.to_owned(), source })
 }
 
-fn check_piece(
-    key: &str,
-    header: &ChunkHeader,
-    have: usize,
-    got: usize,
-) -> Result<(), ClientError> {
+fn check_piece(key: &str, header: &ChunkHeader, have: usize, got: usize) -> Result<(), ClientError> {
     let left = header.total_bytes.saturating_sub(have as u64);
     let starts_there = header.offset == have as u64;
     let fits = (1..=left.max(1)).contains(&(got as u64)) || header.total_bytes == 0;
     if starts_there && fits && header.total_bytes <= MAX_WHOLE_BYTES {
         return Ok(());
     }
-    let source = DecodeError::Length {
-        expected: left,
-        got: got as u64,
-    };
-    Err(ClientError::Malformed {
-        key: key.to_owned(),
-        source,
-    })
+    let source = DecodeError::Length { expected: left, got: got as u64 };
+    Err(ClientError::Malformed { key: key.to_owned(), source })
 }
 
 fn check_sum(key: &str, header: &ChunkHeader, whole: Vec<u8>) -> Result<Vec<u8>, ClientError> {
-    let got: String = Sha256::digest(&whole)
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
+    let got: String = Sha256::digest(&whole).iter().map(|byte| format!("{byte:02x}")).collect();
     if got == header.sha256 {
         Ok(whole)
     } else {
-        Err(ClientError::Checksum {
-            key: key.to_owned(),
-            expected: header.sha256.clone(),
-            got,
-        })
+        Err(ClientError::Checksum { key: key.to_owned(), expected: header.sha256.clone(), got })
     }
 }

@@ -43,17 +43,8 @@ impl<T> Queue<T> {
     pub(crate) fn new(capacity: usize, overflow: Overflow) -> Self {
         let stats = StreamStats::default();
         let items = VecDeque::with_capacity(capacity.clamp(1, 1024));
-        let state = Mutex::new(State {
-            items,
-            stats,
-            next_sequence: None,
-        });
-        Self {
-            state,
-            filled: Condvar::new(),
-            capacity: capacity.max(1),
-            overflow,
-        }
+        let state = Mutex::new(State { items, stats, next_sequence: None });
+        Self { state, filled: Condvar::new(), capacity: capacity.max(1), overflow }
     }
 
     /// Keeps a message; `sequence` is its number in the stream, if the stream is numbered.
@@ -113,40 +104,22 @@ mod tests {
 
     fn filled(overflow: Overflow) -> Queue<u64> {
         let queue = Queue::new(2, overflow);
-        [10, 11, 12]
-            .into_iter()
-            .for_each(|n| queue.push(n, Some(n)));
+        [10, 11, 12].into_iter().for_each(|n| queue.push(n, Some(n)));
         queue
     }
 
     #[test]
     fn latest_wins_or_first_come() {
         let (oldest, newest) = (filled(Overflow::DropOldest), filled(Overflow::DropNewest));
-        assert_eq!(
-            [
-                oldest.pop(NO_WAIT),
-                oldest.pop(NO_WAIT),
-                oldest.pop(NO_WAIT)
-            ],
-            [Some(11), Some(12), None]
-        );
-        assert_eq!(
-            [
-                newest.pop(NO_WAIT),
-                newest.pop(NO_WAIT),
-                newest.pop(NO_WAIT)
-            ],
-            [Some(10), Some(11), None]
-        );
+        assert_eq!([oldest.pop(NO_WAIT), oldest.pop(NO_WAIT), oldest.pop(NO_WAIT)], [Some(11), Some(12), None]);
+        assert_eq!([newest.pop(NO_WAIT), newest.pop(NO_WAIT), newest.pop(NO_WAIT)], [Some(10), Some(11), None]);
         assert_eq!((oldest.stats().received, oldest.stats().dropped), (3, 1));
     }
 
     #[test]
     fn holes_in_the_sequence_are_counted() {
         let queue = Queue::new(8, Overflow::DropNewest);
-        [5, 6, 9, 1, 2]
-            .into_iter()
-            .for_each(|n| queue.push(n, Some(n)));
+        [5, 6, 9, 1, 2].into_iter().for_each(|n| queue.push(n, Some(n)));
         assert_eq!(queue.stats().missed, 2);
     }
 }

@@ -117,28 +117,18 @@ impl Recorder {
         let path = path.as_ref().to_owned();
         let file = File::create(&path).map_err(|error| fault(&path, error))?;
         let options = mcap::WriteOptions::new().compression(None).profile("plica");
-        let writer = options
-            .create(BufWriter::new(file))
-            .map_err(|error| fault(&path, error))?;
-        Ok(Self {
-            path,
-            writer,
-            channels: HashMap::new(),
-        })
+        let writer = options.create(BufWriter::new(file)).map_err(|error| fault(&path, error))?;
+        Ok(Self { path, writer, channels: HashMap::new() })
     }
 
     /// Appends a message.
     pub fn write(&mut self, message: &Recorded) -> Result<(), RecordingError> {
-        self.append(message)
-            .map_err(|error| fault(&self.path, error))
+        self.append(message).map_err(|error| fault(&self.path, error))
     }
 
     /// Ends the file with its index. (Dropping does the same, but cannot report an error.)
     pub fn finish(mut self) -> Result<(), RecordingError> {
-        self.writer
-            .finish()
-            .map(drop)
-            .map_err(|error| fault(&self.path, error))
+        self.writer.finish().map(drop).map_err(|error| fault(&self.path, error))
     }
 
     fn append(&mut self, message: &Recorded) -> mcap::McapResult<()> {
@@ -147,11 +137,8 @@ impl Recorder {
             let (name, encoding, text) = message.kind.schema();
             let schema = self.writer.add_schema(name, encoding, text.as_bytes())?;
             let encoding = message.kind.encoding();
-            let id = self
-                .writer
-                .add_channel(schema, &message.key, encoding, &BTreeMap::new())?;
-            self.channels
-                .insert(slot.clone(), Channel { id, n_messages: 0 });
+            let id = self.writer.add_channel(schema, &message.key, encoding, &BTreeMap::new())?;
+            self.channels.insert(slot.clone(), Channel { id, n_messages: 0 });
         }
         let channel = self.channels.get_mut(&slot).expect("inserted above");
         let header = mcap::records::MessageHeader {
@@ -166,9 +153,7 @@ impl Recorder {
 }
 
 /// Reads a recording message by message, in file order. Channels of other programs are skipped.
-pub fn read(
-    path: impl AsRef<Path>,
-) -> Result<impl Iterator<Item = Result<Recorded, RecordingError>>, RecordingError> {
+pub fn read(path: impl AsRef<Path>) -> Result<impl Iterator<Item = Result<Recorded, RecordingError>>, RecordingError> {
     let path = path.as_ref().to_owned();
     let file = File::open(&path).map_err(|error| fault(&path, error))?;
     let messages = mcap::io::MessageReader::new(BufReader::new(file));
@@ -181,9 +166,7 @@ pub fn read(
 fn recorded(message: mcap::Message<'_>) -> Option<Recorded> {
     let encoding = &message.channel.message_encoding;
     let key = message.channel.topic.clone();
-    let kind = Kind::ALL
-        .into_iter()
-        .find(|kind| kind.encoding() == encoding)?;
+    let kind = Kind::ALL.into_iter().find(|kind| kind.encoding() == encoding)?;
     (Kind::of(&key, kind == Kind::JsonPose) == Some(kind)).then(|| Recorded {
         key,
         kind,
@@ -193,10 +176,7 @@ fn recorded(message: mcap::Message<'_>) -> Option<Recorded> {
 }
 
 fn fault(path: &Path, error: impl std::fmt::Display) -> RecordingError {
-    RecordingError {
-        path: path.to_owned(),
-        message: error.to_string(),
-    }
+    RecordingError { path: path.to_owned(), message: error.to_string() }
 }
 
 /// The tool of a pose key, of whatever session.

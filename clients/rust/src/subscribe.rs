@@ -35,11 +35,7 @@ impl SkinMessage {
 
     pub(crate) fn decode(bytes: Vec<u8>) -> Result<Self, DecodeError> {
         let header = SkinFrame::decode(&bytes)?.header;
-        Ok(Self {
-            header,
-            bytes,
-            received: Instant::now(),
-        })
+        Ok(Self { header, bytes, received: Instant::now() })
     }
 }
 
@@ -92,38 +88,20 @@ impl Client {
     /// Frames of an object; a slow reader gets the newest one and misses the others.
     pub fn subscribe_skin(&self, object: &str) -> Result<Subscription<SkinMessage>, ClientError> {
         check_name(object)?;
-        self.subscribe(
-            &[self.keys.skin(object)],
-            Queue::new(1, Overflow::DropOldest),
-            |sample| {
-                let message = SkinMessage::decode(sample.payload().to_bytes().into_owned())?;
-                let sequence = message.header.sequence;
-                Ok((message, Some(sequence)))
-            },
-        )
+        self.subscribe(&[self.keys.skin(object)], Queue::new(1, Overflow::DropOldest), |sample| {
+            let message = SkinMessage::decode(sample.payload().to_bytes().into_owned())?;
+            let sequence = message.header.sequence;
+            Ok((message, Some(sequence)))
+        })
     }
 
     /// Wrenches of a tool, at most `capacity` of them waiting; further ones are dropped and counted.
-    pub fn subscribe_wrenches(
-        &self,
-        tool: &str,
-        capacity: usize,
-    ) -> Result<Subscription<WrenchMessage>, ClientError> {
+    pub fn subscribe_wrenches(&self, tool: &str, capacity: usize) -> Result<Subscription<WrenchMessage>, ClientError> {
         check_name(tool)?;
-        self.subscribe(
-            &[self.keys.wrench(tool)],
-            Queue::new(capacity, Overflow::DropNewest),
-            |sample| {
-                let wrench = Wrench::decode(&sample.payload().to_bytes())?;
-                Ok((
-                    WrenchMessage {
-                        wrench,
-                        received: Instant::now(),
-                    },
-                    Some(wrench.sequence),
-                ))
-            },
-        )
+        self.subscribe(&[self.keys.wrench(tool)], Queue::new(capacity, Overflow::DropNewest), |sample| {
+            let wrench = Wrench::decode(&sample.payload().to_bytes())?;
+            Ok((WrenchMessage { wrench, received: Instant::now() }, Some(wrench.sequence)))
+        })
     }
 
     /// Whatever is published on some key expressions, in order of arrival, at most `capacity` waiting.
@@ -133,30 +111,22 @@ impl Client {
         capacity: usize,
     ) -> Result<Subscription<RawMessage>, ClientError> {
         let json = Encoding::from(ENCODING_JSON);
-        self.subscribe(
-            key_expressions,
-            Queue::new(capacity, Overflow::DropNewest),
-            move |sample| {
-                let message = RawMessage {
-                    key: sample.key_expr().as_str().to_owned(),
-                    bytes: sample.payload().to_bytes().into_owned(),
-                    json: *sample.encoding() == json,
-                    received: Instant::now(),
-                };
-                Ok((message, None))
-            },
-        )
+        self.subscribe(key_expressions, Queue::new(capacity, Overflow::DropNewest), move |sample| {
+            let message = RawMessage {
+                key: sample.key_expr().as_str().to_owned(),
+                bytes: sample.payload().to_bytes().into_owned(),
+                json: *sample.encoding() == json,
+                received: Instant::now(),
+            };
+            Ok((message, None))
+        })
     }
 
     fn subscribe<T: Send + 'static>(
         &self,
         key_expressions: &[String],
         queue: Queue<T>,
-        decode: impl Fn(&Sample) -> Result<(T, Option<u64>), DecodeError>
-        + Clone
-        + Send
-        + Sync
-        + 'static,
+        decode: impl Fn(&Sample) -> Result<(T, Option<u64>), DecodeError> + Clone + Send + Sync + 'static,
     ) -> Result<Subscription<T>, ClientError> {
         let queue = Arc::new(queue);
         let mut subscribers = Vec::new();
@@ -166,16 +136,10 @@ impl Client {
                 Ok((message, sequence)) => queue.push(message, sequence),
                 Err(_) => queue.count_malformed(),
             };
-            let subscriber = self
-                .session
-                .declare_subscriber(key.clone())
-                .callback(guarded(store));
+            let subscriber = self.session.declare_subscriber(key.clone()).callback(guarded(store));
             subscribers.push(subscriber.wait().map_err(ClientError::bus)?);
         }
-        Ok(Subscription {
-            queue,
-            _subscribers: subscribers,
-        })
+        Ok(Subscription { queue, _subscribers: subscribers })
     }
 }
 

@@ -62,9 +62,7 @@ pub enum TrajectoryError {
         path: PathBuf,
     },
     /// A workspace without room.
-    #[error(
-        "workspace from {min_m:?} to {max_m:?} m has no room: each min must be below its max, all finite"
-    )]
+    #[error("workspace from {min_m:?} to {max_m:?} m has no room: each min must be below its max, all finite")]
     Workspace {
         /// Lower corner.
         min_m: [f64; 3],

@@ -7,6 +7,7 @@ use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
 use common::{SmallDaemon, frame, mesh_bytes};
+use plica_client::mesh::rest_positions;
 use plica_client::protocol::pose::Pose;
 use plica_client::protocol::rpc::StepReply;
 use plica_client::{Client, ClientError, ClientOptions, PoseSource};
@@ -21,26 +22,13 @@ fn poses_out_wrenches_back() {
     let client = daemon.client();
     let wrenches = client.subscribe_wrenches("probe", 1000).unwrap();
     let mut source = PoseSource::new();
-    let sent: Vec<Pose> = (0..100)
-        .map(|i| source.pose([f64::from(i), 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]))
-        .collect();
-    sent.iter()
-        .for_each(|pose| client.publish_pose("probe", pose).unwrap());
+    let sent: Vec<Pose> = (0..100).map(|i| source.pose([f64::from(i), 0.0, 0.0], [0.0, 0.0, 0.0, 1.0])).collect();
+    sent.iter().for_each(|pose| client.publish_pose("probe", pose).unwrap());
     for pose in &sent {
         let echo = wrenches.next(LONG).expect("an echo of each pose").wrench;
-        assert_eq!(
-            (echo.pose_source_time_ns, echo.force_n),
-            (pose.source_time_ns, pose.position_m)
-        );
+        assert_eq!((echo.pose_source_time_ns, echo.force_n), (pose.source_time_ns, pose.position_m));
     }
-    assert_eq!(
-        (
-            wrenches.stats().received,
-            wrenches.stats().missed,
-            wrenches.stats().dropped
-        ),
-        (100, 0, 0)
-    );
+    assert_eq!((wrenches.stats().received, wrenches.stats().missed, wrenches.stats().dropped), (100, 0, 0));
     let started = Instant::now();
     drop(client);
     assert!(started.elapsed() < Duration::from_secs(3));
@@ -57,11 +45,7 @@ fn a_slow_reader_gets_the_latest_skin_and_counts_the_rest() {
         daemon.session.put(&key, frame(1)).wait().unwrap();
         std::thread::sleep(Duration::from_millis(20));
     }
-    daemon
-        .session
-        .put(&key, b"no skin".to_vec())
-        .wait()
-        .unwrap();
+    daemon.session.put(&key, b"no skin".to_vec()).wait().unwrap();
     (10..20).for_each(|n| daemon.session.put(&key, frame(n)).wait().unwrap());
     let mut newest = 0;
     while newest != 19 {
@@ -78,65 +62,34 @@ fn questions_and_refusals() {
     let client = daemon.client();
     assert_eq!(client.status().unwrap().scene, "small");
     assert_eq!(client.rpc("pause", &json!({})).unwrap()["paused"], true);
-    assert_eq!(
-        client.step(5, Vec::new()).unwrap(),
-        StepReply {
-            tick: 5,
-            sim_time_s: 0.0
-        }
-    );
-    let Err(ClientError::Refused(error)) = client.rpc("step", &json!({"tick": 5})) else {
-        panic!("refused")
-    };
+    assert_eq!(client.step(5, Vec::new()).unwrap(), StepReply { tick: 5, sim_time_s: 0.0 });
+    let Err(ClientError::Refused(error)) = client.rpc("step", &json!({"tick": 5})) else { panic!("refused") };
     assert_eq!(error.code, "rpc_malformed");
-    let Err(ClientError::Refused(error)) = client.rpc("explode", &json!({})) else {
-        panic!("refused")
-    };
+    let Err(ClientError::Refused(error)) = client.rpc("explode", &json!({})) else { panic!("refused") };
     assert_eq!(error.code, "rpc_unknown");
-    assert!(matches!(
-        client.rpc("*", &json!({})),
-        Err(ClientError::Name(_))
-    ));
-    assert!(matches!(
-        client.skin_now("no_such"),
-        Err(ClientError::NoAnswer { .. })
-    ));
+    assert!(matches!(client.rpc("*", &json!({})), Err(ClientError::Name(_))));
+    assert!(matches!(client.skin_now("no_such"), Err(ClientError::NoAnswer { .. })));
 }
 
 #[test]
 fn a_mesh_in_pieces_is_checked() {
     let daemon = SmallDaemon::start();
     let client = daemon.client();
-    assert_eq!(client.mesh("wedge").unwrap(), mesh_bytes());
-    assert!(matches!(
-        client.mesh("broken"),
-        Err(ClientError::Checksum { .. })
-    ));
+    let glb = client.mesh("wedge").unwrap();
+    assert_eq!(glb, mesh_bytes());
+    assert_eq!(rest_positions(&glb).unwrap()[1], [0.04, 0.0, 0.01]);
+    assert!(rest_positions(b"glTF").is_err());
+    assert!(matches!(client.mesh("broken"), Err(ClientError::Checksum { .. })));
 }
 
 #[test]
 fn nobody_there_is_said_at_once() {
-    let port = TcpListener::bind("127.0.0.1:0")
-        .unwrap()
-        .local_addr()
-        .unwrap()
-        .port();
-    let options = ClientOptions {
-        endpoint: format!("tcp/127.0.0.1:{port}"),
-        ..ClientOptions::default()
-    };
+    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let options = ClientOptions { endpoint: format!("tcp/127.0.0.1:{port}"), ..ClientOptions::default() };
     let started = Instant::now();
     let error = Client::connect(&options).unwrap_err().to_string();
-    assert!(error.starts_with(&format!(
-        "no plicad answered on tcp/127.0.0.1:{port}: start one with `plicad serve`"
-    )));
+    assert!(error.starts_with(&format!("no plicad answered on tcp/127.0.0.1:{port}: start one with `plicad serve`")));
     assert!(started.elapsed() < LONG, "{:?}", started.elapsed());
-    let options = ClientOptions {
-        endpoint: "nonsense".to_owned(),
-        ..ClientOptions::default()
-    };
-    assert!(matches!(
-        Client::connect(&options),
-        Err(ClientError::Config { .. })
-    ));
+    let options = ClientOptions { endpoint: "nonsense".to_owned(), ..ClientOptions::default() };
+    assert!(matches!(Client::connect(&options), Err(ClientError::Config { .. })));
 }

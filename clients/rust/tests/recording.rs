@@ -7,57 +7,18 @@ use plica_client::recording::{Kind, Recorded, Recorder, read, tool_of};
 use tempfile::TempDir;
 
 fn message(key: &str, kind: Kind, log_time_ns: u64, bytes: &[u8]) -> Recorded {
-    Recorded {
-        key: key.to_owned(),
-        kind,
-        log_time_ns,
-        bytes: bytes.to_vec(),
-    }
+    Recorded { key: key.to_owned(), kind, log_time_ns, bytes: bytes.to_vec() }
 }
 
 fn some_messages() -> Vec<Recorded> {
-    let pose = |sequence| Pose {
-        sequence,
-        source_id: 7,
-        ..Pose::default()
-    };
+    let pose = |sequence| Pose { sequence, source_id: 7, ..Pose::default() };
     vec![
-        message(
-            "plica/v1/main/tool/left/pose",
-            Kind::Pose,
-            100,
-            &pose(1).encode(),
-        ),
-        message(
-            "plica/v1/main/tool/right/pose",
-            Kind::Pose,
-            100,
-            &pose(1).encode(),
-        ),
-        message(
-            "plica/v1/main/tool/left/pose",
-            Kind::JsonPose,
-            150,
-            pose(2).to_json().as_bytes(),
-        ),
-        message(
-            "plica/v1/main/tool/left/wrench",
-            Kind::Wrench,
-            160,
-            &Wrench::default().encode(),
-        ),
-        message(
-            "plica/v1/main/tool/left/pose",
-            Kind::Pose,
-            200,
-            b"not even a pose",
-        ),
-        message(
-            "plica/v1/main/object/wedge/skin",
-            Kind::Skin,
-            210,
-            &vec![7; 3_000_000],
-        ),
+        message("plica/v1/main/tool/left/pose", Kind::Pose, 100, &pose(1).encode()),
+        message("plica/v1/main/tool/right/pose", Kind::Pose, 100, &pose(1).encode()),
+        message("plica/v1/main/tool/left/pose", Kind::JsonPose, 150, pose(2).to_json().as_bytes()),
+        message("plica/v1/main/tool/left/wrench", Kind::Wrench, 160, &Wrench::default().encode()),
+        message("plica/v1/main/tool/left/pose", Kind::Pose, 200, b"not even a pose"),
+        message("plica/v1/main/object/wedge/skin", Kind::Skin, 210, &vec![7; 3_000_000]),
     ]
 }
 
@@ -66,9 +27,7 @@ fn what_goes_in_comes_out() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("a.mcap");
     let mut recorder = Recorder::create(&path).unwrap();
-    some_messages()
-        .iter()
-        .for_each(|message| recorder.write(message).unwrap());
+    some_messages().iter().for_each(|message| recorder.write(message).unwrap());
     recorder.finish().unwrap();
     let back: Vec<Recorded> = read(&path).unwrap().map(Result::unwrap).collect();
     assert_eq!(back, some_messages());
@@ -79,9 +38,7 @@ fn a_file_cut_short_gives_its_beginning_and_an_error() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("a.mcap");
     let mut recorder = Recorder::create(&path).unwrap();
-    some_messages()
-        .iter()
-        .for_each(|message| recorder.write(message).unwrap());
+    some_messages().iter().for_each(|message| recorder.write(message).unwrap());
     recorder.finish().unwrap();
     let whole = std::fs::read(&path).unwrap();
     std::fs::write(&path, &whole[..whole.len() - 1_000_000]).unwrap();

@@ -37,70 +37,32 @@ fn csv_without_tool_names_and_without_the_extension() {
 
 #[test]
 fn tum_starts_at_zero_and_is_normalised() {
-    let text = "# timestamp tx ty tz qx qy qz qw\n1305031098.50 1.3 0.6 1.6 0.0 0.0 0.0 1.004\n1305031098.75 1 2 3 0 0 0 1\n";
+    let text =
+        "# timestamp tx ty tz qx qy qz qw\n1305031098.50 1.3 0.6 1.6 0.0 0.0 0.0 1.004\n1305031098.75 1 2 3 0 0 0 1\n";
     let poses = read_text("a.tum", text).unwrap();
     assert_eq!((poses[0].time_s, poses[1].time_s), (0.0, 0.25));
     assert_eq!(poses[0].orientation_xyzw, [0.0, 0.0, 0.0, 1.0]);
-    assert_eq!(
-        (poses[1].position_m, &poses[1].tool),
-        ([1.0, 2.0, 3.0], &None)
-    );
+    assert_eq!((poses[1].position_m, &poses[1].tool), ([1.0, 2.0, 3.0], &None));
 }
 
 #[test]
 fn faults_name_file_and_line() {
     let csv = |rows: &str| read_text("a.csv", &format!("{HEADER}{rows}")).unwrap_err();
     let tum = |rows: &str| read_text("a.tum", rows).unwrap_err();
-    assert_eq!(
-        csv("0,a,0,0,x,0,0,0,1\n"),
-        "a.csv:2: `pz` is `x`, expected a number"
-    );
-    assert_eq!(
-        csv("0,a,0,0,nan,0,0,0,1\n"),
-        "a.csv:2: `pz` is `nan`, expected a finite number"
-    );
-    assert_eq!(
-        csv("0,a,0,0,0,0,0,0,1\n0.1,a,0,0,0\n"),
-        "a.csv:3: 5 columns, expected 9"
-    );
-    assert_eq!(
-        csv("0,a,0,0,0,0,0,0,1\n0,a,0,0,0,0,0,0,1\n"),
-        "a.csv:3: a second pose of the same tool at 0 s"
-    );
-    assert_eq!(
-        csv("1,a,0,0,0,0,0,0,1\n0,b,0,0,0,0,0,0,1\n"),
-        "a.csv:3: time 0 s is before the line above it (1 s)"
-    );
-    assert_eq!(
-        csv("0,a,0,0,0,0,0,0,2\n"),
-        "a.csv:2: orientation has length 2, expected 1 within 0.01"
-    );
-    assert_eq!(
-        csv("0,a,2000,0,0,0,0,0,1\n"),
-        "a.csv:2: `position` is 2000, at most 1000 is accepted"
-    );
+    assert_eq!(csv("0,a,0,0,x,0,0,0,1\n"), "a.csv:2: `pz` is `x`, expected a number");
+    assert_eq!(csv("0,a,0,0,nan,0,0,0,1\n"), "a.csv:2: `pz` is `nan`, expected a finite number");
+    assert_eq!(csv("0,a,0,0,0,0,0,0,1\n0.1,a,0,0,0\n"), "a.csv:3: 5 columns, expected 9");
+    assert_eq!(csv("0,a,0,0,0,0,0,0,1\n0,a,0,0,0,0,0,0,1\n"), "a.csv:3: a second pose of the same tool at 0 s");
+    assert_eq!(csv("1,a,0,0,0,0,0,0,1\n0,b,0,0,0,0,0,0,1\n"), "a.csv:3: time 0 s is before the line above it (1 s)");
+    assert_eq!(csv("0,a,0,0,0,0,0,0,2\n"), "a.csv:2: orientation has length 2, expected 1 within 0.01");
+    assert_eq!(csv("0,a,2000,0,0,0,0,0,1\n"), "a.csv:2: `position` is 2000, at most 1000 is accepted");
     assert!(csv("0,a/b,0,0,0,0,0,0,1\n").starts_with("a.csv:2: `a/b` is not a name"));
     assert_eq!(csv(""), "a.csv: no poses in it");
-    assert!(
-        read_text("a.csv", "t,x\n")
-            .unwrap_err()
-            .starts_with("a.csv:1: the header must be `time_s,tool,px")
-    );
-    assert_eq!(
-        tum("0 1 2 3\n"),
-        "a.tum:1: 4 columns, expected `timestamp tx ty tz qx qy qz qw`"
-    );
-    assert_eq!(
-        tum("# x\n0 1 2 3 0 0 0 one\n"),
-        "a.tum:2: `qw` is `one`, expected a number"
-    );
+    assert!(read_text("a.csv", "t,x\n").unwrap_err().starts_with("a.csv:1: the header must be `time_s,tool,px"));
+    assert_eq!(tum("0 1 2 3\n"), "a.tum:1: 4 columns, expected `timestamp tx ty tz qx qy qz qw`");
+    assert_eq!(tum("# x\n0 1 2 3 0 0 0 one\n"), "a.tum:2: `qw` is `one`, expected a number");
     assert_eq!(tum(""), "a.tum: no poses in it");
-    assert!(
-        read("no/such/file.csv")
-            .unwrap_err()
-            .to_string()
-            .starts_with("no/such/file.csv: ")
-    );
+    assert!(read("no/such/file.csv").unwrap_err().to_string().starts_with("no/such/file.csv: "));
 }
 
 #[test]
@@ -108,12 +70,7 @@ fn a_file_that_is_no_text() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("a.tum");
     std::fs::write(&path, b"0 0 0 0 0 0 0 1\n\xff\xfe\n").unwrap();
-    assert!(
-        read(&path)
-            .unwrap_err()
-            .to_string()
-            .ends_with("a.tum:2: not text")
-    );
+    assert!(read(&path).unwrap_err().to_string().ends_with("a.tum:2: not text"));
 }
 
 fn at(positions_m: &[[f64; 3]]) -> Vec<TrackedPose> {
@@ -126,21 +83,14 @@ fn at(positions_m: &[[f64; 3]]) -> Vec<TrackedPose> {
     positions_m.iter().enumerate().map(pose).collect()
 }
 
-const ROOM: Workspace = Workspace {
-    min_m: [0.0, 0.0, 0.0],
-    max_m: [0.1, 0.2, 0.3],
-};
+const ROOM: Workspace = Workspace { min_m: [0.0, 0.0, 0.0], max_m: [0.1, 0.2, 0.3] };
 
 #[test]
 fn fit_has_one_scale_and_fills_the_tightest_axis() {
     let mut poses = at(&[[1.0, 1.0, 1.0], [3.0, 2.0, 1.5], [2.0, 1.0, 1.0]]);
     let done = fit(&mut poses, ROOM).unwrap();
     assert!((done.scale - 0.05).abs() < 1e-15);
-    let expected = [
-        [0.0, 0.075, 0.1375],
-        [0.1, 0.125, 0.1625],
-        [0.05, 0.075, 0.1375],
-    ];
+    let expected = [[0.0, 0.075, 0.1375], [0.1, 0.125, 0.1625], [0.05, 0.075, 0.1375]];
     for (pose, expected) in poses.iter().zip(expected) {
         (0..3).for_each(|i| assert!((pose.position_m[i] - expected[i]).abs() < 1e-15, "{pose:?}"));
         assert_eq!(pose.orientation_xyzw, [0.0, 0.6, 0.0, 0.8]);
@@ -160,20 +110,8 @@ fn fit_of_a_line_and_of_a_point() {
 
 #[test]
 fn a_workspace_needs_room() {
-    for max_m in [
-        [0.1, 0.0, 0.1],
-        [-0.1, 0.1, 0.1],
-        [f64::NAN; 3],
-        [f64::INFINITY; 3],
-    ] {
-        let error = fit(
-            &mut at(&[[0.0; 3]]),
-            Workspace {
-                min_m: [0.0; 3],
-                max_m,
-            },
-        )
-        .unwrap_err();
+    for max_m in [[0.1, 0.0, 0.1], [-0.1, 0.1, 0.1], [f64::NAN; 3], [f64::INFINITY; 3]] {
+        let error = fit(&mut at(&[[0.0; 3]]), Workspace { min_m: [0.0; 3], max_m }).unwrap_err();
         assert!(error.to_string().contains("has no room"), "{error}");
     }
 }

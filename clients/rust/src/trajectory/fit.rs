@@ -43,14 +43,9 @@ pub fn fit(poses: &mut [TrackedPose], workspace: Workspace) -> Result<Fit, Traje
         .unwrap_or(1.0);
     let (from_m, to_m) = (bounds.centre(), workspace.centre());
     for pose in poses {
-        pose.position_m =
-            std::array::from_fn(|i| to_m[i] + scale * (pose.position_m[i] - from_m[i]));
+        pose.position_m = std::array::from_fn(|i| to_m[i] + scale * (pose.position_m[i] - from_m[i]));
     }
-    Ok(Fit {
-        scale,
-        from_m,
-        to_m,
-    })
+    Ok(Fit { scale, from_m, to_m })
 }
 
 impl Workspace {
@@ -61,15 +56,9 @@ impl Workspace {
 
 fn bounds(poses: &[TrackedPose]) -> Workspace {
     let Some(first) = poses.first() else {
-        return Workspace {
-            min_m: [0.0; 3],
-            max_m: [0.0; 3],
-        };
+        return Workspace { min_m: [0.0; 3], max_m: [0.0; 3] };
     };
-    let start = Workspace {
-        min_m: first.position_m,
-        max_m: first.position_m,
-    };
+    let start = Workspace { min_m: first.position_m, max_m: first.position_m };
     poses.iter().fold(start, |b, pose| Workspace {
         min_m: std::array::from_fn(|i| b.min_m[i].min(pose.position_m[i])),
         max_m: std::array::from_fn(|i| b.max_m[i].max(pose.position_m[i])),

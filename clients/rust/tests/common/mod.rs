@@ -9,7 +9,7 @@ use plica_client::protocol::keys::Keys;
 use plica_client::protocol::pose::Pose;
 use plica_client::protocol::rpc::{ErrorReply, Method, StepReply, StepRequest, decode_request};
 use plica_client::protocol::skin::{self, SkinHeader};
-use plica_client::protocol::status::Status;
+use plica_client::protocol::status::{ObjectStatus, Status, ToolStatus};
 use plica_client::protocol::wrench::Wrench;
 use plica_client::{Client, ClientOptions};
 use serde_json::json;
@@ -32,11 +32,7 @@ impl SmallDaemon {
 
     /// Listens, and serves nothing.
     pub(crate) fn silent() -> Self {
-        let port = TcpListener::bind("127.0.0.1:0")
-            .unwrap()
-            .local_addr()
-            .unwrap()
-            .port();
+        let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
         let endpoint = format!("tcp/127.0.0.1:{port}");
         let mut config = Config::default();
         for (key, value) in [
@@ -54,122 +50,90 @@ impl SmallDaemon {
     fn serve(&self) {
         let keys = Keys::new("main").unwrap();
         let (session, echo_keys) = (self.session.clone(), keys.clone());
-        let echo = self
-            .session
-            .declare_subscriber(keys.pose("*"))
-            .callback(move |sample| {
-                let tool = echo_keys
-                    .tool_of_pose(sample.key_expr().as_str())
-                    .unwrap()
-                    .to_owned();
-                let pose = Pose::decode(&sample.payload().to_bytes()).unwrap();
-                let wrench = Wrench {
-                    sequence: pose.sequence,
-                    pose_sequence: pose.sequence,
-                    pose_source_time_ns: pose.source_time_ns,
-                    force_n: pose.position_m,
-                    ..Wrench::default()
-                };
-                session
-                    .put(echo_keys.wrench(&tool), wrench.encode().to_vec())
-                    .wait()
-                    .unwrap();
-            });
+        let echo = self.session.declare_subscriber(keys.pose("*")).callback(move |sample| {
+            let tool = echo_keys.tool_of_pose(sample.key_expr().as_str()).unwrap().to_owned();
+            let pose = Pose::decode(&sample.payload().to_bytes()).unwrap();
+            let wrench = Wrench {
+                sequence: pose.sequence,
+                pose_sequence: pose.sequence,
+                pose_source_time_ns: pose.source_time_ns,
+                force_n: pose.position_m,
+                ..Wrench::default()
+            };
+            session.put(echo_keys.wrench(&tool), wrench.encode().to_vec()).wait().unwrap();
+        });
         echo.background().wait().unwrap();
         self.queryable(&keys.mesh("*"), serve_mesh);
         self.queryable(&keys.status(), |query| {
-            let status = Status {
-                scene: "small".to_owned(),
-                ..Status::default()
-            };
-            query
-                .reply(
-                    query.key_expr().clone(),
-                    serde_json::to_vec(&status).unwrap(),
-                )
-                .wait()
-                .unwrap();
+            let mut status = Status { scene: "small".to_owned(), ..Status::default() };
+            status.objects.insert("wedge".to_owned(), ObjectStatus::default());
+            status.tools.insert("probe".to_owned(), ToolStatus::default());
+            query.reply(query.key_expr().clone(), serde_json::to_vec(&status).unwrap()).wait().unwrap();
         });
         self.queryable(&keys.rpc("*"), serve_rpc);
         self.queryable(&keys.skin("wedge"), |query| {
-            query
-                .reply(query.key_expr().clone(), frame(7))
-                .wait()
-                .unwrap();
+            query.reply(query.key_expr().clone(), frame(7)).wait().unwrap();
         });
     }
 
     fn queryable(&self, key: &str, answer: fn(Query)) {
-        self.session
-            .declare_queryable(key.to_owned())
-            .callback(answer)
-            .background()
-            .wait()
-            .unwrap();
+        self.session.declare_queryable(key.to_owned()).callback(answer).background().wait().unwrap();
     }
 
     pub(crate) fn client(&self) -> Client {
-        Client::connect(&ClientOptions {
-            endpoint: self.endpoint.clone(),
-            ..ClientOptions::default()
-        })
-        .unwrap()
+        Client::connect(&ClientOptions { endpoint: self.endpoint.clone(), ..ClientOptions::default() }).unwrap()
     }
 }
 
 pub(crate) fn frame(sequence: u64) -> Vec<u8> {
     let mut bytes = Vec::new();
-    let header = SkinHeader {
-        sequence,
-        ..SkinHeader::default()
-    };
+    let header = SkinHeader { sequence, ..SkinHeader::default() };
     skin::encode_f32_into(&mut bytes, &header, &[[1.0, 2.0, 3.0]; 4], None).unwrap();
     bytes
 }
 
+/// A plate of 40 x 20 mm, 10 mm high, as the smallest GLB with positions; padded so that it needs three pieces.
 pub(crate) fn mesh_bytes() -> Vec<u8> {
-    (0..2 * CHUNK_BYTES + 1234).map(|i| (i / 7) as u8).collect()
+    let corners = [[0.0_f32, 0.0, 0.01], [0.04, 0.0, 0.01], [0.04, 0.02, 0.01], [0.0, 0.02, 0.0]];
+    let mut binary: Vec<u8> = corners.iter().flatten().flat_map(|c| c.to_le_bytes()).collect();
+    binary.resize(2 * CHUNK_BYTES + 1232, 7);
+    let mut text = json!({
+        "asset": {"version": "2.0"},
+        "buffers": [{"byteLength": binary.len()}],
+        "bufferViews": [{"buffer": 0, "byteLength": 48}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
+                       "min": [0.0, 0.0, 0.0], "max": [0.04, 0.02, 0.01]}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+    })
+    .to_string();
+    text.extend(std::iter::repeat_n(' ', text.len().next_multiple_of(4) - text.len()));
+    let word = |n: usize| (n as u32).to_le_bytes();
+    let total = 28 + text.len() + binary.len();
+    [b"glTF".as_slice(), &word(2), &word(total), &word(text.len()), b"JSON", text.as_bytes()]
+        .into_iter()
+        .chain([word(binary.len()).as_slice(), b"BIN\0", &binary])
+        .flatten()
+        .copied()
+        .collect()
 }
 
 fn serve_mesh(query: Query) {
     let whole = mesh_bytes();
     let offset = offset_of(query.parameters().as_str()).unwrap();
-    let mut sha256: String = Sha256::digest(&whole)
-        .iter()
-        .map(|b| format!("{b:02x}"))
-        .collect();
+    let mut sha256: String = Sha256::digest(&whole).iter().map(|b| format!("{b:02x}")).collect();
     if query.key_expr().as_str().contains("/broken/") {
         sha256 = "0".repeat(64);
     }
-    let header = ChunkHeader {
-        total_bytes: whole.len() as u64,
-        offset,
-        sha256,
-    };
-    let reply = query.reply(
-        query.key_expr().clone(),
-        piece(&whole, offset).unwrap().to_vec(),
-    );
+    let header = ChunkHeader { total_bytes: whole.len() as u64, offset, sha256 };
+    let reply = query.reply(query.key_expr().clone(), piece(&whole, offset).unwrap().to_vec());
     reply.attachment(header.to_json()).wait().unwrap();
 }
 
 fn serve_rpc(query: Query) {
-    let name = query
-        .key_expr()
-        .as_str()
-        .rsplit('/')
-        .next()
-        .unwrap()
-        .to_owned();
-    let payload = query
-        .payload()
-        .map(|bytes| bytes.to_bytes().into_owned())
-        .unwrap_or_default();
+    let name = query.key_expr().as_str().rsplit('/').next().unwrap().to_owned();
+    let payload = query.payload().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default();
     match answer_rpc(&name, &payload) {
-        Ok(reply) => query
-            .reply(query.key_expr().clone(), reply.to_string())
-            .wait()
-            .unwrap(),
+        Ok(reply) => query.reply(query.key_expr().clone(), reply.to_string()).wait().unwrap(),
         Err(error) => query.reply_err(error.to_json()).wait().unwrap(),
     }
 }
@@ -178,10 +142,7 @@ fn answer_rpc(name: &str, payload: &[u8]) -> Result<serde_json::Value, ErrorRepl
     match Method::parse(name)? {
         Method::Step => {
             let request: StepRequest = decode_request(payload)?;
-            let reply = StepReply {
-                tick: u64::from(request.ticks),
-                sim_time_s: request.poses.len() as f64,
-            };
+            let reply = StepReply { tick: u64::from(request.ticks), sim_time_s: request.poses.len() as f64 };
             Ok(serde_json::to_value(reply).unwrap())
         }
         _ => Ok(json!({"tick": 0, "sim_time_s": 0.0, "paused": true})),

@@ -194,12 +194,8 @@ fn positive(text: &str) -> Result<f64, String> {
 
 fn point(text: &str) -> Result<[f64; 3], String> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
-    let numbers = numbers
-        .ok()
-        .and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
-    numbers
-        .filter(|p| p.iter().all(|c| c.is_finite()))
-        .ok_or_else(|| "expected three numbers `x,y,z`".to_owned())
+    let numbers = numbers.ok().and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
+    numbers.filter(|p| p.iter().all(|c| c.is_finite())).ok_or_else(|| "expected three numbers `x,y,z`".to_owned())
 }
 
 #[cfg(test)]

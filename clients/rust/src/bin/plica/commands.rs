@@ -52,11 +52,7 @@ impl Stop {
 }
 
 /// The wanted name, or the only one there is.
-pub(crate) fn choose<T>(
-    what: &str,
-    wanted: Option<&str>,
-    there: &BTreeMap<String, T>,
-) -> anyhow::Result<String> {
+pub(crate) fn choose<T>(what: &str, wanted: Option<&str>, there: &BTreeMap<String, T>) -> anyhow::Result<String> {
     let names = there.keys().cloned().collect::<Vec<_>>().join(", ");
     match (wanted, there.keys().next()) {
         (Some(name), _) if there.contains_key(name) => Ok(name.to_owned()),

@@ -14,9 +14,7 @@ use output::Output;
 
 fn main() -> ExitCode {
     let args = Args::parse();
-    let output = Output {
-        json: args.common.json,
-    };
+    let output = Output { json: args.common.json };
     match run(&args, output) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

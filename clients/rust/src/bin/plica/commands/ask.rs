@@ -10,19 +10,14 @@ use crate::output::Output;
 
 pub(crate) fn status(client: &Client, output: Output) -> anyhow::Result<()> {
     let value = client.status_json()?;
-    let status: Status =
-        serde_json::from_value(value.clone()).context("the daemon's status has another shape")?;
+    let status: Status = serde_json::from_value(value.clone()).context("the daemon's status has another shape")?;
     output.result(&value, &table(&status));
     Ok(())
 }
 
 pub(crate) fn rpc(client: &Client, rpc: &Rpc, output: Output) -> anyhow::Result<()> {
-    let arguments: Value = serde_json::from_str(&rpc.arguments).with_context(|| {
-        format!(
-            "`{}` is not JSON; quote it for the shell: '{{\"ticks\": 1}}'",
-            rpc.arguments
-        )
-    })?;
+    let arguments: Value = serde_json::from_str(&rpc.arguments)
+        .with_context(|| format!("`{}` is not JSON; quote it for the shell: '{{\"ticks\": 1}}'", rpc.arguments))?;
     let reply = client.rpc(&rpc.method, &arguments)?;
     output.result(&reply, &reply.to_string());
     Ok(())
@@ -31,27 +26,13 @@ pub(crate) fn rpc(client: &Client, rpc: &Rpc, output: Output) -> anyhow::Result<
 fn table(status: &Status) -> String {
     let state = if status.paused { "paused" } else { "running" };
     let mut lines = vec![
-        format!(
-            "scene {}, session {}, {state}, up {:.1} s",
-            status.scene, status.session, status.uptime_s
-        ),
-        format!(
-            "tick {} at {:.3} s, scheduling {:?}",
-            status.tick, status.sim_time_s, status.realtime.scheduling
-        ),
+        format!("scene {}, session {}, {state}, up {:.1} s", status.scene, status.session, status.uptime_s),
+        format!("tick {} at {:.3} s, scheduling {:?}", status.tick, status.sim_time_s, status.realtime.scheduling),
         line("tick", &status.tick_us),
     ];
-    lines.extend(
-        status
-            .stages
-            .iter()
-            .map(|(name, stage)| line(&format!("  {name}"), stage)),
-    );
+    lines.extend(status.stages.iter().map(|(name, stage)| line(&format!("  {name}"), stage)));
     lines.push(line("lateness", &status.lateness_us));
-    lines.push(format!(
-        "overruns {}, skipped ticks {}",
-        status.overruns, status.skipped_ticks
-    ));
+    lines.push(format!("overruns {}, skipped ticks {}", status.overruns, status.skipped_ticks));
     for (name, object) in &status.objects {
         let state = if object.sleeping { "sleeping" } else { "awake" };
         lines.push(format!(
@@ -70,34 +51,14 @@ fn table(status: &Status) -> String {
         };
         let [x, y, z] = tool.force_n;
         let accepted = tool.poses_accepted;
-        lines.push(format!(
-            "tool {name}: {state}, force [{x:.3}, {y:.3}, {z:.3}] N, {accepted} poses"
-        ));
-        lines.extend(
-            tool.poses_rejected
-                .iter()
-                .map(|(kind, n)| format!("  rejected {kind}: {n}")),
-        );
+        lines.push(format!("tool {name}: {state}, force [{x:.3}, {y:.3}, {z:.3}] N, {accepted} poses"));
+        lines.extend(tool.poses_rejected.iter().map(|(kind, n)| format!("  rejected {kind}: {n}")));
     }
-    lines.extend(
-        status
-            .rejected
-            .iter()
-            .map(|(kind, n)| format!("rejected {kind}: {n}")),
-    );
-    lines.extend(
-        status
-            .realtime
-            .warnings
-            .iter()
-            .map(|warning| format!("warning: {warning}")),
-    );
+    lines.extend(status.rejected.iter().map(|(kind, n)| format!("rejected {kind}: {n}")));
+    lines.extend(status.realtime.warnings.iter().map(|warning| format!("warning: {warning}")));
     lines.join("\n")
 }
 
 fn line(name: &str, d: &Distribution) -> String {
-    format!(
-        "{name:<16} p50 {:8.1}  p99 {:8.1}  p99.9 {:8.1}  max {:8.1} us",
-        d.p50, d.p99, d.p999, d.max
-    )
+    format!("{name:<16} p50 {:8.1}  p99 {:8.1}  p99.9 {:8.1}  max {:8.1} us", d.p50, d.p99, d.p999, d.max)
 }

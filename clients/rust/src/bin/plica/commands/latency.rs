@@ -58,10 +58,7 @@ struct Echoes {
 impl Echoes {
     fn new(start_ns: u64) -> anyhow::Result<Self> {
         let histogram = Histogram::new_with_bounds(1, MOST_NS, 3).context("histogram bounds")?;
-        Ok(Self {
-            histogram,
-            newest_ns: start_ns,
-        })
+        Ok(Self { histogram, newest_ns: start_ns })
     }
 
     /// Source times before `start_ns` belong to poses of others and are left out.
@@ -70,23 +67,15 @@ impl Echoes {
             let (sent_ns, received_ns) = (wrench.pose_source_time_ns, clock.at_ns(received));
             if sent_ns > self.newest_ns && sent_ns <= received_ns {
                 self.newest_ns = sent_ns;
-                self.histogram
-                    .saturating_record((received_ns - sent_ns).max(1));
+                self.histogram.saturating_record((received_ns - sent_ns).max(1));
             }
         }
     }
 }
 
-fn report(
-    histogram: &Histogram<u64>,
-    tool: &str,
-    published: u64,
-    output: Output,
-) -> anyhow::Result<()> {
+fn report(histogram: &Histogram<u64>, tool: &str, published: u64, output: Output) -> anyhow::Result<()> {
     if histogram.is_empty() {
-        bail!(
-            "no wrench of `{tool}` echoed a pose: `plica status` tells whether they are rejected"
-        );
+        bail!("no wrench of `{tool}` echoed a pose: `plica status` tells whether they are rejected");
     }
     let us = |ns: u64| ns as f64 / 1e3;
     let at = |quantile: f64| us(histogram.value_at_quantile(quantile));
@@ -96,9 +85,8 @@ fn report(
         "tool": tool, "poses": published, "echoed": echoed,
         "motion_to_force_us": {"count": echoed, "min": min, "p50": p50, "p90": p90, "p99": p99, "p999": p999, "max": max},
     });
-    let text = format!(
-        "motion to force: p50 {p50:.0}, p99 {p99:.0}, max {max:.0} us ({echoed} of {published} poses echoed)"
-    );
+    let text =
+        format!("motion to force: p50 {p50:.0}, p99 {p99:.0}, max {max:.0} us ({echoed} of {published} poses echoed)");
     output.result(&value, &text);
     Ok(())
 }

@@ -26,9 +26,7 @@ pub(crate) fn plan(client: &Client, motion: &Motion) -> anyhow::Result<Plan> {
     let skin = skin(client, &object)?;
     let bounds = bounds(&skin).context("the object has no vertices")?;
     let path = Path {
-        surface_m: motion
-            .at_m
-            .unwrap_or_else(|| surface_above_middle(&skin, &bounds)),
+        surface_m: motion.at_m.unwrap_or_else(|| surface_above_middle(&skin, &bounds)),
         tip_radius_m: motion.tip_radius_m,
         depth_m: motion.depth_m,
         clearance_m: CLEARANCE_M,
@@ -36,25 +34,17 @@ pub(crate) fn plan(client: &Client, motion: &Motion) -> anyhow::Result<Plan> {
         period_s: motion.period_s,
     };
     let workspace = room_above(&bounds, &path);
-    Ok(Plan {
-        tool,
-        path,
-        workspace,
-    })
+    Ok(Plan { tool, path, workspace })
 }
 
 fn skin(client: &Client, object: &str) -> anyhow::Result<Vec<[f64; 3]>> {
-    let positions =
-        rest_positions(&client.mesh(object)?).context("the daemon's mesh cannot be read")?;
+    let positions = rest_positions(&client.mesh(object)?).context("the daemon's mesh cannot be read")?;
     Ok(positions.into_iter().map(|p| p.map(f64::from)).collect())
 }
 
 fn bounds(points: &[[f64; 3]]) -> Option<Workspace> {
     let first = *points.first()?;
-    let start = Workspace {
-        min_m: first,
-        max_m: first,
-    };
+    let start = Workspace { min_m: first, max_m: first };
     Some(points.iter().fold(start, |b, p| Workspace {
         min_m: std::array::from_fn(|i| b.min_m[i].min(p[i])),
         max_m: std::array::from_fn(|i| b.max_m[i].max(p[i])),
@@ -76,15 +66,7 @@ fn room_above(bounds: &Workspace, path: &Path) -> Workspace {
     let quarter = |i: usize| 0.25 * (bounds.max_m[i] - bounds.min_m[i]);
     let touch_m = path.surface_m[2] + path.tip_radius_m;
     Workspace {
-        min_m: [
-            bounds.min_m[0] + quarter(0),
-            bounds.min_m[1] + quarter(1),
-            touch_m - path.depth_m,
-        ],
-        max_m: [
-            bounds.max_m[0] - quarter(0),
-            bounds.max_m[1] - quarter(1),
-            touch_m + path.clearance_m,
-        ],
+        min_m: [bounds.min_m[0] + quarter(0), bounds.min_m[1] + quarter(1), touch_m - path.depth_m],
+        max_m: [bounds.max_m[0] - quarter(0), bounds.max_m[1] - quarter(1), touch_m + path.clearance_m],
     }
 }

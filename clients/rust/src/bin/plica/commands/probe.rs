@@ -32,12 +32,7 @@ pub(crate) fn run(client: &Client, probe: &Probe, output: Output) -> anyhow::Res
             break;
         }
         let tool = pose.tool.as_deref().unwrap_or(&plan.tool);
-        client.publish_pose(
-            tool,
-            &sources
-                .of(tool)
-                .pose(pose.position_m, pose.orientation_xyzw),
-        )?;
+        client.publish_pose(tool, &sources.of(tool).pose(pose.position_m, pose.orientation_xyzw))?;
         published += 1;
         bar.inc(1);
         while let Some(message) = wrenches.try_next() {

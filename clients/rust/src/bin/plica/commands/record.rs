@@ -27,12 +27,7 @@ pub(crate) fn run(client: &Client, record: &Record, output: Output) -> anyhow::R
     let bar = progress(None, "messages");
     let start = Instant::now();
     let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
-    let over = |now: Instant| {
-        record
-            .seconds
-            .is_some_and(|s| (now - start).as_secs_f64() >= s)
-            || stop.is_set()
-    };
+    let over = |now: Instant| record.seconds.is_some_and(|s| (now - start).as_secs_f64() >= s) || stop.is_set();
     while !over(Instant::now()) {
         if let Some(message) = messages.next(LOOK) {
             write(&mut recorder, message, clock, &mut counts)?;
@@ -52,9 +47,8 @@ pub(crate) fn run(client: &Client, record: &Record, output: Output) -> anyhow::R
         "file": record.out, "seconds": seconds, "poses": poses, "skins": skins, "wrenches": wrenches, "dropped": dropped,
     });
     let file = record.out.display();
-    let text = format!(
-        "{file}: {poses} poses, {skins} skins, {wrenches} wrenches in {seconds:.1} s, {dropped} dropped"
-    );
+    let text =
+        format!("{file}: {poses} poses, {skins} skins, {wrenches} wrenches in {seconds:.1} s, {dropped} dropped");
     output.result(&value, &text);
     Ok(())
 }
@@ -73,12 +67,7 @@ fn write(
     clock: SourceClock,
     counts: &mut BTreeMap<&'static str, u64>,
 ) -> anyhow::Result<()> {
-    let RawMessage {
-        key,
-        bytes,
-        json,
-        received,
-    } = message;
+    let RawMessage { key, bytes, json, received } = message;
     let kind = Kind::of(&key, json).with_context(|| format!("unexpected key `{key}`"))?;
     let name = match kind {
         Kind::Pose | Kind::JsonPose => "pose",
@@ -86,11 +75,6 @@ fn write(
         Kind::Wrench => "wrench",
     };
     *counts.entry(name).or_default() += 1;
-    recorder.write(&Recorded {
-        key,
-        kind,
-        log_time_ns: clock.at_ns(received),
-        bytes,
-    })?;
+    recorder.write(&Recorded { key, kind, log_time_ns: clock.at_ns(received), bytes })?;
     Ok(())
 }

@@ -40,39 +40,27 @@ pub(crate) fn run(client: &Client, replay: &Replay, output: Output) -> anyhow::R
     bar.finish_and_clear();
     let seconds = start.elapsed().as_secs_f64();
     let value = json!({"file": replay.file, "poses": published, "tools": publishers.len(), "seconds": seconds});
-    let text = format!(
-        "{published} poses of {} tools in {seconds:.1} s",
-        publishers.len()
-    );
+    let text = format!("{published} poses of {} tools in {seconds:.1} s", publishers.len());
     output.result(&value, &text);
     Ok(())
 }
 
 fn poses(replay: &Replay) -> anyhow::Result<Vec<Recorded>> {
     let is_pose = |message: &Recorded| matches!(message.kind, Kind::Pose | Kind::JsonPose);
-    let poses: Vec<Recorded> = read(&replay.file)?
-        .filter(|message| message.as_ref().map_or(true, is_pose))
-        .collect::<Result<_, _>>()?;
+    let poses: Vec<Recorded> =
+        read(&replay.file)?.filter(|message| message.as_ref().map_or(true, is_pose)).collect::<Result<_, _>>()?;
     if poses.is_empty() {
-        bail!(
-            "{}: no poses in it; was anybody publishing while it was recorded?",
-            replay.file.display()
-        );
+        bail!("{}: no poses in it; was anybody publishing while it was recorded?", replay.file.display());
     }
     Ok(poses)
 }
 
 /// One publisher per recorded key, under the session that is connected now.
-fn publishers(
-    client: &Client,
-    poses: &[Recorded],
-) -> anyhow::Result<HashMap<String, PosePublisher>> {
+fn publishers(client: &Client, poses: &[Recorded]) -> anyhow::Result<HashMap<String, PosePublisher>> {
     let mut publishers = HashMap::new();
     for pose in poses {
         if !publishers.contains_key(&pose.key) {
-            let Some(tool) = tool_of(&pose.key) else {
-                bail!("`{}` is not a pose key", pose.key)
-            };
+            let Some(tool) = tool_of(&pose.key) else { bail!("`{}` is not a pose key", pose.key) };
             publishers.insert(pose.key.clone(), client.lossless_pose_publisher(tool)?);
         }
     }
@@ -81,16 +69,11 @@ fn publishers(
 
 fn due(pose: &Recorded, first_ns: u64, replay: &Replay) -> Duration {
     let after_ns = pose.log_time_ns.saturating_sub(first_ns);
-    if replay.fast {
-        Duration::ZERO
-    } else {
-        Duration::from_nanos(after_ns).div_f64(replay.speed)
-    }
+    if replay.fast { Duration::ZERO } else { Duration::from_nanos(after_ns).div_f64(replay.speed) }
 }
 
 fn with_source(mut bytes: Vec<u8>, kind: Kind, new_source: Option<u32>) -> Vec<u8> {
-    if let (Some(source_id), Kind::Pose, Some(field)) = (new_source, kind, bytes.get_mut(SOURCE_ID))
-    {
+    if let (Some(source_id), Kind::Pose, Some(field)) = (new_source, kind, bytes.get_mut(SOURCE_ID)) {
         field.copy_from_slice(&source_id.to_le_bytes());
     }
     bytes
