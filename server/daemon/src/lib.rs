@@ -1,2 +1,13 @@
-//! plicad: the daemon.
+//! The daemon of Plica: configuration, the real-time loop, the bus and the command line.
+//!
+//! It holds no finite-element arithmetic: scenes become [`plica_sim::ModelDescription`]s in [`scene`], wire types
+//! become simulation types in [`wire`], and everything else moves bytes and time.
+
+pub mod bus;
 pub mod config;
+pub mod limits;
+pub mod realtime;
+pub mod scene;
+pub mod server;
+pub mod surface;
+pub mod wire;

@@ -1,0 +1,34 @@
+//! Keeps panics inside callbacks.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use super::counters::SharedCounters;
+
+/// A callback that never unwinds into Zenoh, where a panic would end reception from that client for good. A caught
+/// panic is counted as `internal`.
+pub(super) fn guarded<T>(
+    counters: &Arc<SharedCounters>,
+    callback: impl Fn(T) + Send + Sync + 'static,
+) -> impl Fn(T) + Send + Sync + 'static {
+    let counters = Arc::clone(counters);
+    move |value| {
+        if catch_unwind(AssertUnwindSafe(|| callback(value))).is_err() {
+            counters.count("internal");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_counted_and_goes_no_further() {
+        let counters = Arc::new(SharedCounters::default());
+        let callback = guarded(&counters, |divisor: i32| drop(10 / divisor));
+        callback(0);
+        callback(1);
+        assert_eq!(counters.copy()["internal"], 1);
+    }
+}

@@ -1,0 +1,35 @@
+//! Subscribes to poses.
+
+use std::sync::Arc;
+
+use plica_protocol::ENCODING_JSON;
+use plica_protocol::pose::Pose;
+use zenoh::Wait;
+use zenoh::bytes::Encoding;
+use zenoh::pubsub::Subscriber;
+use zenoh::sample::{Sample, SampleKind};
+
+use super::guard::guarded;
+use super::{BusError, Shared};
+
+pub(super) fn declare(shared: &Arc<Shared>) -> Result<Subscriber<()>, BusError> {
+    let json = Encoding::from(ENCODING_JSON);
+    let receiver = Arc::clone(shared);
+    let callback = guarded(&shared.counters, move |sample: Sample| receive(&receiver, &json, &sample));
+    let subscriber = shared.session.declare_subscriber(shared.keys.pose("*")).callback(callback);
+    subscriber.wait().map_err(|e| shared.error(e))
+}
+
+fn receive(shared: &Shared, json: &Encoding, sample: &Sample) {
+    if sample.kind() != SampleKind::Put {
+        return;
+    }
+    let tool = shared.keys.tool_of_pose(sample.key_expr().as_str()).and_then(|name| shared.intake.tool(name));
+    let Some(tool) = tool else {
+        shared.counters.count("unknown_tool");
+        return;
+    };
+    let bytes = sample.payload().to_bytes();
+    let is_json = sample.encoding() == json;
+    shared.intake.arrive(tool, if is_json { Pose::decode_json(&bytes) } else { Pose::decode(&bytes) });
+}

@@ -1,0 +1,114 @@
+//! Opens the Zenoh session: loopback only unless the operator says otherwise.
+
+use std::net::TcpListener;
+use std::path::PathBuf;
+
+use plica_protocol::{DEFAULT_ENDPOINT, DEFAULT_SESSION};
+use zenoh::{Config, Session, Wait};
+
+use super::BusError;
+use super::port_owner::owner_of_port;
+
+/// What a session is opened with when no file is given.
+pub const DEFAULT_ZENOH_CONFIG: &str = include_str!("../../../../configs/zenoh/default.json5");
+
+/// Where the daemon is found.
+#[derive(Debug, Clone)]
+pub struct BusOptions {
+    /// Endpoint to listen on; `None`: what the configuration says.
+    pub listen: Option<String>,
+    /// Name of the session in every key.
+    pub session: String,
+    /// Zenoh configuration in place of the built-in one.
+    pub zenoh_config: Option<PathBuf>,
+}
+
+impl Default for BusOptions {
+    fn default() -> Self {
+        Self { listen: None, session: DEFAULT_SESSION.into(), zenoh_config: None }
+    }
+}
+
+impl BusOptions {
+    /// The endpoint, for messages.
+    pub fn place(&self) -> String {
+        match (&self.listen, &self.zenoh_config) {
+            (Some(endpoint), _) => endpoint.clone(),
+            (None, Some(file)) => format!("the endpoints of {}", file.display()),
+            (None, None) => DEFAULT_ENDPOINT.into(),
+        }
+    }
+}
+
+pub(super) fn open(options: &BusOptions) -> Result<Session, BusError> {
+    let config = config(options)?;
+    if options.listen.is_some() || options.zenoh_config.is_none() {
+        refuse_taken_port(&options.place())?;
+    }
+    zenoh::open(config)
+        .wait()
+        .map_err(|e| BusError::Zenoh { endpoint: options.place(), problem: e.to_string() })
+}
+
+fn config(options: &BusOptions) -> Result<Config, BusError> {
+    let mut config = match &options.zenoh_config {
+        Some(file) => Config::from_file(file)
+            .map_err(|e| BusError::Config { file: file.display().to_string(), problem: e.to_string() })?,
+        None => Config::from_json5(DEFAULT_ZENOH_CONFIG)
+            .map_err(|e| BusError::Config { file: "the built-in configuration".into(), problem: e.to_string() })?,
+    };
+    if let Some(endpoint) = &options.listen {
+        let endpoints = serde_json::json!([endpoint]).to_string();
+        config
+            .insert_json5("listen/endpoints", &endpoints)
+            .map_err(|e| BusError::Config { file: "--listen".into(), problem: e.to_string() })?;
+    }
+    Ok(config)
+}
+
+/// Zenoh's own message does not say who has the port; this one does.
+fn refuse_taken_port(endpoint: &str) -> Result<(), BusError> {
+    let Some(address) = endpoint.strip_prefix("tcp/").or(endpoint.strip_prefix("tls/")) else { return Ok(()) };
+    match TcpListener::bind(address.split(['?', '#']).next().unwrap_or(address)) {
+        Err(e) if e.kind() == std::io::ErrorKind::AddrInUse => {
+            let owner = address.rsplit(':').next().and_then(|port| port.parse().ok()).and_then(owner_of_port);
+            let owner = owner.map_or_else(
+                || ", probably by another plicad or a Zenoh router".into(),
+                |(pid, name)| format!(" by `{name}` (process {pid})"),
+            );
+            Err(BusError::AddressInUse { endpoint: endpoint.into(), owner })
+        }
+        // Other errors are Zenoh's to tell.
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+    use super::*;
+
+    #[test]
+    fn the_default_is_loopback_without_scouting() {
+        let config = config(&BusOptions::default()).unwrap();
+        let get = |key: &str| config.get_json(key).unwrap();
+        assert!(get("listen/endpoints").contains("tcp/127.0.0.1:7447"));
+        assert_eq!(get("scouting/multicast/enabled"), "false");
+        assert_eq!(get("scouting/gossip/enabled"), "false");
+        assert_eq!(get("transport/link/tx/queue/size/data"), "16");
+        assert_eq!(get("transport/link/tx/queue/congestion_control/drop/wait_before_drop"), "0");
+    }
+
+    #[test]
+    fn a_taken_port_names_its_owner() {
+        let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+        let endpoint = format!("tcp/127.0.0.1:{}", taken.local_addr().unwrap().port());
+        let options = BusOptions { listen: Some(endpoint), ..BusOptions::default() };
+        let message = open(&options).map(|_| ()).unwrap_err().to_string();
+        assert!(message.contains("in use") && message.contains("--listen"), "{message}");
+        if cfg!(target_os = "linux") {
+            assert!(message.contains(&format!("process {}", std::process::id())), "{message}");
+        }
+    }
+}

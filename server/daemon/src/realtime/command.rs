@@ -1,0 +1,63 @@
+//! What the simulation thread can be asked to do, and what it answers.
+
+use plica_sim::ToolPose;
+
+/// An order, obeyed between ticks.
+#[derive(Debug)]
+pub enum Command {
+    /// Rest state, tick 0.
+    Reset,
+    /// Stops.
+    Pause,
+    /// Goes on.
+    Resume,
+    /// Runs ticks while stopped. The poses are applied before the first one.
+    Step {
+        /// How many.
+        ticks: u32,
+        /// Poses; the vector travels back in the reply, so that it is freed elsewhere.
+        poses: Vec<ToolPose>,
+    },
+    /// Keeps the present state.
+    Snapshot,
+    /// Returns to a kept state.
+    Restore {
+        /// Number of the snapshot.
+        id: u64,
+    },
+}
+
+/// Where the simulation stands after an order.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// Ticks since reset.
+    pub tick: u64,
+    /// Simulated time [s].
+    pub sim_time_s: f64,
+    /// Whether it stands still.
+    pub paused: bool,
+    /// Number of the snapshot that was taken.
+    pub snapshot: Option<u64>,
+}
+
+/// Why an order was not obeyed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refusal {
+    /// Steps are for a simulation that stands still.
+    NotPaused,
+    /// In lock-step the simulation never runs by itself.
+    LockStep,
+    /// There is no such snapshot, or it has been overwritten.
+    UnknownSnapshot,
+    /// Steps of an earlier order are still running.
+    Busy,
+}
+
+/// Answer to one order.
+#[derive(Debug)]
+pub struct Reply {
+    /// What came of it.
+    pub outcome: Result<Outcome, Refusal>,
+    /// The vector of a [`Command::Step`], on its way back.
+    pub returned: Vec<ToolPose>,
+}

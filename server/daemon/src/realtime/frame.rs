@@ -1,0 +1,56 @@
+//! What leaves the simulation thread.
+
+use plica_sim::{TickReport, ToolReading};
+
+/// The skin after a tick.
+#[derive(Debug, Clone, Default)]
+pub struct Frame {
+    /// Ticks since reset.
+    pub tick: u64,
+    /// Simulated time [s].
+    pub sim_time_s: f64,
+    /// Source time of the newest pose of any tool [ns].
+    pub newest_pose_source_time_ns: u64,
+    /// Whether a state was rolled back since the frame before.
+    pub degraded: bool,
+    /// Whether the object is at rest and this is a repeat.
+    pub sleeping: bool,
+    /// World positions `[n_skin]` [m].
+    pub positions: Vec<[f32; 3]>,
+    /// Counts frames that are due for publishing; a frame made for a question alone keeps the number.
+    pub due: u64,
+    /// Number of the newest question that this frame answers.
+    pub answers: u64,
+}
+
+/// What one tool feels after a tick.
+#[derive(Debug, Clone, Copy)]
+pub struct ToolFrame {
+    /// Ticks since reset.
+    pub tick: u64,
+    /// Simulated time [s].
+    pub sim_time_s: f64,
+    /// The tool.
+    pub reading: ToolReading,
+}
+
+/// Where the simulation stands, for the status.
+#[derive(Debug, Clone, Default)]
+pub struct Reading {
+    /// Ticks since reset.
+    pub tick: u64,
+    /// Simulated time [s].
+    pub sim_time_s: f64,
+    /// Whether it stands still.
+    pub paused: bool,
+    /// Times that a state was rolled back.
+    pub rollbacks: u64,
+    /// The last tick.
+    pub report: TickReport,
+    /// Deepest penetration since reset [m].
+    pub max_penetration_m: f32,
+    /// Ticks since reset that repeated a solve with block Jacobi.
+    pub fallbacks: u64,
+    /// All tools, `[n_tools]`.
+    pub tools: Vec<ToolReading>,
+}

@@ -1,0 +1,57 @@
+//! Times the stages of a tick.
+
+use std::time::Instant;
+
+use plica_sim::{Probe, Stage};
+
+use super::Statistics;
+
+/// A probe that adds up the time spent in each stage; stages that alternate are summed.
+#[derive(Debug)]
+pub struct StageTimer {
+    current: Option<Stage>,
+    since: Instant,
+    sums_ns: [u64; Stage::ALL.len()],
+}
+
+impl StageTimer {
+    /// Outside of any stage.
+    pub fn new() -> Self {
+        Self { current: None, since: Instant::now(), sums_ns: [0; Stage::ALL.len()] }
+    }
+
+    /// Ends the last stage; the time of each stage since the last call [ns].
+    pub fn take_ns(&mut self) -> [u64; Stage::ALL.len()] {
+        self.close(Instant::now());
+        self.current = None;
+        std::mem::take(&mut self.sums_ns)
+    }
+
+    /// Ends the last stage and records all of them.
+    pub fn record(&mut self, statistics: &Statistics) {
+        for (histogram, ns) in statistics.stages.iter().zip(self.take_ns()) {
+            histogram.record(ns);
+        }
+    }
+
+    fn close(&mut self, now: Instant) {
+        if let Some(stage) = self.current {
+            let index = Stage::ALL.iter().position(|s| *s == stage).expect("all stages are listed");
+            self.sums_ns[index] += now.duration_since(self.since).as_nanos() as u64;
+        }
+        self.since = now;
+    }
+}
+
+impl Default for StageTimer {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Probe for StageTimer {
+    fn enter(&mut self, stage: Stage) {
+        self.close(Instant::now());
+        self.current = Some(stage);
+    }
+}

@@ -1,0 +1,24 @@
+//! What the simulation thread counts and any thread may read.
+
+use std::sync::atomic::AtomicU64;
+
+use plica_sim::Stage;
+
+use super::AtomicHistogram;
+
+/// Written by the simulation thread alone.
+#[derive(Debug, Default)]
+pub struct Statistics {
+    /// Duration of whole ticks.
+    pub tick: AtomicHistogram,
+    /// Duration of each stage, in the order of [`Stage::ALL`].
+    pub stages: [AtomicHistogram; Stage::ALL.len()],
+    /// How late the thread woke up.
+    pub lateness: AtomicHistogram,
+    /// Ticks that ended after the next one was due.
+    pub overruns: AtomicU64,
+    /// Ticks given up because catching up is bounded.
+    pub skipped: AtomicU64,
+    /// Wrenches that were made while their queue was full.
+    pub wrench_drops: AtomicU64,
+}

@@ -1,0 +1,191 @@
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+
+use nalgebra::Isometry3;
+use plica_sim::{NoProbe, PoseSample, ToolPose};
+
+use super::*;
+use crate::config::Config;
+use crate::scene;
+
+const SCENE: &str = r#"
+[objects.block]
+mesh = { generator = "block", size_m = [0.04, 0.04, 0.02] }
+material = { young_modulus_pa = 3e4, poisson_ratio = 0.4, density_kg_per_m3 = 1000.0 }
+supports = { fixed = { faces = ["z_min"] } }
+coarse = { divisions = [2, 2, 2] }
+skin = { spacing_m = 0.005 }
+[tools.ball]
+shape = { ball = { radius_m = 0.006 } }
+coupling = "rigid"
+"#;
+
+fn start(lock_step: bool) -> (Loop, Ports) {
+    let config = Config::parse(Path::new("block.toml"), SCENE).unwrap();
+    let model = Arc::new(scene::build(&config).unwrap());
+    Loop::new(model, LoopOptions { publish_hz: 90.0, wrench_hz: 500.0, lock_step })
+}
+
+fn sample(sequence: u64, z: f64) -> PoseSample {
+    PoseSample { sequence, source_time_ns: 1000 * sequence, valid: true, pose: Isometry3::translation(0.02, 0.02, z) }
+}
+
+fn order(core: &mut Loop, ports: &mut Ports, command: Command) -> Result<Outcome, Refusal> {
+    ports.commands.orders.push(command).unwrap();
+    core.turn(&mut NoProbe);
+    while core.is_stepping() {
+        core.turn(&mut NoProbe);
+    }
+    ports.commands.replies.pop().unwrap().outcome
+}
+
+fn positions(core: &mut Loop, ports: &mut Ports) -> Vec<[f32; 3]> {
+    let question = ports.frames.ask();
+    core.turn(&mut NoProbe);
+    assert!(ports.frames.frames.update());
+    let frame = ports.frames.frames.output_buffer();
+    assert_eq!(frame.answers, question);
+    frame.positions.clone()
+}
+
+#[test]
+fn a_turn_is_one_tick_of_simulated_time() {
+    let (mut core, _ports) = start(false);
+    for k in 1..=5 {
+        assert!(matches!(core.turn(&mut NoProbe), Turn::Ticked(_)));
+        assert_eq!(core.state().tick(), k);
+    }
+    assert!((core.state().sim_time_s() - 5e-3).abs() < 1e-12);
+}
+
+#[test]
+fn poses_arrive_and_wrenches_leave_at_their_rate() {
+    let (mut core, mut ports) = start(false);
+    ports.wrenches[0].listening.store(true, Relaxed);
+    ports.poses[0].push(sample(7, 0.1)).unwrap();
+    for _ in 0..10 {
+        core.turn(&mut NoProbe);
+    }
+    let first = ports.wrenches[0].wrenches.pop().unwrap();
+    assert_eq!((first.tick, first.reading.pose_sequence, first.reading.pose_source_time_ns), (1, 7, 7000));
+    assert_eq!(1 + ports.wrenches[0].wrenches.slots(), 5);
+}
+
+#[test]
+fn nobody_listening_costs_no_frame_and_no_wrench() {
+    let (mut core, mut ports) = start(false);
+    ports.poses[0].push(sample(1, 0.1)).unwrap();
+    for _ in 0..100 {
+        core.turn(&mut NoProbe);
+    }
+    assert!(!ports.frames.frames.update());
+    assert!(ports.wrenches[0].wrenches.is_empty());
+}
+
+#[test]
+fn frames_come_at_the_publishing_rate() {
+    let (mut core, mut ports) = start(false);
+    ports.frames.listening.store(true, Relaxed);
+    let mut due = 0;
+    for _ in 0..200 {
+        core.turn(&mut NoProbe);
+        if ports.frames.frames.update() {
+            due += 1;
+            assert_eq!(ports.frames.frames.output_buffer().due, due);
+        }
+    }
+    assert!((18..=19).contains(&due), "90 Hz for 0.2 s: {due}");
+}
+
+#[test]
+fn a_publisher_that_never_reads_delays_nothing_and_is_counted() {
+    let (mut core, ports) = start(false);
+    let mut ports = ports;
+    ports.frames.listening.store(true, Relaxed);
+    ports.wrenches[0].listening.store(true, Relaxed);
+    ports.poses[0].push(sample(1, 0.1)).unwrap();
+    for _ in 0..1000 {
+        core.turn(&mut NoProbe);
+    }
+    assert_eq!(core.state().tick(), 1000);
+    assert_eq!(ports.statistics.wrench_drops.load(Relaxed), 500 - 256);
+}
+
+#[test]
+fn lock_step_ticks_when_told_to() {
+    let (mut core, mut ports) = start(true);
+    assert_eq!(core.turn(&mut NoProbe), Turn::Still);
+    let poses = vec![ToolPose { tool: 0, sample: sample(3, 0.1) }];
+    let outcome = order(&mut core, &mut ports, Command::Step { ticks: 4, poses }).unwrap();
+    assert_eq!((outcome.tick, outcome.paused), (4, true));
+    assert_eq!(core.state().tools()[0].pose_sequence, 3);
+    assert_eq!(order(&mut core, &mut ports, Command::Resume), Err(Refusal::LockStep));
+    assert_eq!(order(&mut core, &mut ports, Command::Step { ticks: 0, poses: Vec::new() }).unwrap().tick, 4);
+}
+
+#[test]
+fn steps_need_a_pause_and_resume_goes_on() {
+    let (mut core, mut ports) = start(false);
+    let refused = order(&mut core, &mut ports, Command::Step { ticks: 1, poses: Vec::new() });
+    assert_eq!(refused, Err(Refusal::NotPaused));
+    assert!(order(&mut core, &mut ports, Command::Pause).unwrap().paused);
+    let tick = core.state().tick();
+    assert_eq!(core.turn(&mut NoProbe), Turn::Still);
+    assert_eq!(core.state().tick(), tick);
+    assert!(!order(&mut core, &mut ports, Command::Resume).unwrap().paused);
+    assert!(core.state().tick() > tick);
+}
+
+#[test]
+fn snapshot_and_restore_repeat_the_same_bytes() {
+    let (mut core, mut ports) = start(true);
+    let press = |sequence, z| vec![ToolPose { tool: 0, sample: sample(sequence, z) }];
+    order(&mut core, &mut ports, Command::Step { ticks: 20, poses: press(1, 0.024) }).unwrap();
+    let id = order(&mut core, &mut ports, Command::Snapshot).unwrap().snapshot.unwrap();
+    let mut run = |core: &mut Loop, ports: &mut Ports| {
+        order(core, ports, Command::Step { ticks: 30, poses: press(2, 0.023) }).unwrap();
+        positions(core, ports)
+    };
+    let once = run(&mut core, &mut ports);
+    assert_eq!(order(&mut core, &mut ports, Command::Restore { id }).unwrap().tick, 20);
+    assert_eq!(run(&mut core, &mut ports), once);
+    assert_eq!(order(&mut core, &mut ports, Command::Restore { id: 99 }), Err(Refusal::UnknownSnapshot));
+}
+
+#[test]
+fn old_snapshots_are_overwritten() {
+    let (mut core, mut ports) = start(true);
+    for expected in 1..=9 {
+        let outcome = order(&mut core, &mut ports, Command::Snapshot).unwrap();
+        assert_eq!(outcome.snapshot, Some(expected));
+    }
+    assert_eq!(order(&mut core, &mut ports, Command::Restore { id: 1 }), Err(Refusal::UnknownSnapshot));
+    assert!(order(&mut core, &mut ports, Command::Restore { id: 2 }).is_ok());
+}
+
+#[test]
+fn reset_returns_to_rest_and_forgets_waiting_poses() {
+    let (mut core, mut ports) = start(true);
+    let rest = positions(&mut core, &mut ports);
+    let poses = vec![ToolPose { tool: 0, sample: sample(1, 0.022) }];
+    order(&mut core, &mut ports, Command::Step { ticks: 50, poses }).unwrap();
+    ports.poses[0].push(sample(9, 0.022)).unwrap();
+    assert_eq!(order(&mut core, &mut ports, Command::Reset).unwrap().tick, 0);
+    assert_eq!(positions(&mut core, &mut ports), rest);
+    order(&mut core, &mut ports, Command::Step { ticks: 1, poses: Vec::new() }).unwrap();
+    assert!(!core.state().tools()[0].present);
+}
+
+#[test]
+fn the_thread_runs_and_gives_the_loop_back() {
+    let (core, _ports) = start(false);
+    let running = spawn(core, ThreadOptions::default()).unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(50));
+    assert!(running.is_alive());
+    let core = running.stop().unwrap();
+    assert!(core.state().tick() > 0);
+    assert_eq!(core.statistics().tick.summary().count, core.state().tick());
+}
