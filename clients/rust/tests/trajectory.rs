@@ -93,7 +93,20 @@ fn fit_has_one_scale_and_fills_the_tightest_axis() {
     let expected = [[0.0, 0.075, 0.1375], [0.1, 0.125, 0.1625], [0.05, 0.075, 0.1375]];
     for (pose, expected) in poses.iter().zip(expected) {
         (0..3).for_each(|i| assert!((pose.position_m[i] - expected[i]).abs() < 1e-15, "{pose:?}"));
-        assert_eq!(pose.orientation_xyzw, [0.0, 0.6, 0.0, 0.8]);
+        assert_eq!(pose.orientation_xyzw, [0.0, 0.0, 0.0, 1.0]);
+    }
+}
+
+#[test]
+fn fit_starts_upright_and_turns_as_the_hand_turned() {
+    let half = 0.5_f64.sqrt();
+    let mut poses = at(&[[0.0; 3], [1.0; 3]]);
+    // A quarter turn about x, then one about the world's z on top of it.
+    poses[0].orientation_xyzw = [half, 0.0, 0.0, half];
+    poses[1].orientation_xyzw = [0.5, 0.5, 0.5, 0.5];
+    fit(&mut poses, ROOM).unwrap();
+    for (pose, expected) in poses.iter().zip([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, half, half]]) {
+        (0..4).for_each(|i| assert!((pose.orientation_xyzw[i] - expected[i]).abs() < 1e-15, "{pose:?}"));
     }
 }
 

@@ -122,7 +122,7 @@ pub(crate) struct Probe {
     /// Trajectory (CSV or TUM) to follow at its own times, in place of a pattern.
     #[arg(long, conflicts_with_all = ["pattern", "rate_hz", "seconds"])]
     pub(crate) poses: Option<PathBuf>,
-    /// Scale and move the trajectory into a box above the object.
+    /// Scale and move the trajectory into a box above the object; the tool starts upright.
     #[arg(long, requires = "poses")]
     pub(crate) fit: bool,
 }
