@@ -149,3 +149,15 @@ fn guarded<T>(callback: impl Fn(T) + Send + Sync + 'static) -> impl Fn(T) + Send
         let _ = catch_unwind(AssertUnwindSafe(|| callback(value)));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_stays_inside_the_callback() {
+        let callback = guarded(|divisor: u32| assert!(divisor != 0, "on purpose"));
+        callback(0);
+        callback(1);
+    }
+}
