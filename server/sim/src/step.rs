@@ -6,7 +6,8 @@
 use nalgebra::{Isometry3, Vector6};
 
 use crate::contact::{
-    ContactCoupling, Placement, ProxyMotion, Rows, Selection, V3, at_arm, contact_point, evaluate, settle, stack_forces,
+    ContactCoupling, Placement, ProxyMotion, Rows, Selection, V3, at_arm, contact_point, evaluate, predict_secant,
+    settle, stack_forces,
 };
 use crate::lanes::Node;
 use crate::model::Model;
@@ -18,9 +19,9 @@ use crate::tool::Target;
 use crate::workspace::Workspace;
 
 /// Passes in which rows may switch either way.
-const FREE_PASSES: u32 = 3;
+const FREE_PASSES: u32 = 4;
 /// Passes in all; the later ones only switch rows off.
-const MAX_PASSES: u32 = 8;
+const MAX_PASSES: u32 = 12;
 /// A solve may leave this share of the contact impulse as residual.
 const IMPULSE_TOLERANCE: f32 = 1e-4;
 /// Contacts are looked for no farther than this many cells away.
@@ -178,6 +179,7 @@ fn predict_rows(model: &Model, rows: &mut Rows, motions: &[ProxyMotion]) {
         let yields = row.inverse_mass;
         let crowd = rows.crowding(index, model.cell_size);
         rows.rows[index].stiffness = kappa / (h * h * yields * crowd);
+        predict_secant(&mut rows.rows[index]);
     }
     stack_forces(rows);
 }

@@ -124,7 +124,7 @@ fn write_readings(model: &Model, input: &TickInput<'_>, state: &mut State, works
                 force -= row.force.cast::<f64>();
                 torque -= row.arm.cross(&row.force).cast::<f64>();
                 n_contacts += 1;
-                sliding |= row.contact.slides && row.friction > 0.0;
+                sliding |= row.contact.slides();
             }
         }
         reading.contact_force_n = force;

@@ -15,7 +15,7 @@ mod surface;
 
 pub(crate) use coupling::ContactCoupling;
 pub(crate) use detect::{Candidate, Detector};
-pub(crate) use law::{evaluate, settle, stack_forces};
+pub(crate) use law::{evaluate, predict_secant, settle, stack_forces};
 pub(crate) use point::{ContactPoint, contact_point};
 pub(crate) use proxy::{Proxy, ProxyMotion, at_arm};
 pub(crate) use rows::{Contact, Rows, Selection};

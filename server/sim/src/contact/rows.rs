@@ -15,9 +15,8 @@ pub(crate) struct Contact {
     pub(crate) tangential_force: V3,
     /// Tangential displacement since it sticks [m].
     pub(crate) slip: V3,
-    pub(crate) slides: bool,
-    /// Secant stiffness of sliding, `mu f_n / |T u|` [N/m].
-    pub(crate) slide_stiffness: f32,
+    /// Secant of the friction cone, `min(1, mu f_n / |t|)`: 1 sticks, less slides, 0 is to be predicted.
+    pub(crate) secant: f32,
     /// Penetration that was there when it began, fading out [m]; never positive.
     pub(crate) bias: f32,
     pub(crate) point: V3,
@@ -26,6 +25,13 @@ pub(crate) struct Contact {
     pub(crate) gap: f32,
     /// Forces of the last solve, for reports [N].
     pub(crate) force: V3,
+}
+
+impl Contact {
+    /// Whether friction is at its limit.
+    pub(crate) fn slides(&self) -> bool {
+        self.secant < 1.0
+    }
 }
 
 /// A contact in this step's solve.
@@ -228,12 +234,10 @@ impl Rows {
     fn hand_over(&mut self, first_row: usize, selection: &Selection<'_>) {
         let rows = &mut self.rows[first_row..];
         let is_continued = |rows: &[Row], o: &Contact| rows.iter().any(|r| r.contact.feature == o.feature);
-        let slides = selection.old.iter().any(|o| o.body == selection.body && o.slides && o.normal_force > 0.0);
+        let slides = selection.old.iter().any(|o| o.body == selection.body && o.slides() && o.normal_force > 0.0);
         let n_old = selection.old.len();
-        for row in rows.iter_mut() {
-            let feature = row.contact.feature;
-            let is_new = !selection.old.iter().any(|o| o.body == selection.body && o.feature == feature);
-            row.contact.slides |= is_new && slides;
+        for row in rows.iter_mut().filter(|r| r.contact.normal_force <= 0.0) {
+            row.contact.secant = if slides { 0.0 } else { 1.0 };
         }
         for index in 0..n_old {
             let old = &selection.old[index];
@@ -247,8 +251,7 @@ impl Rows {
                 && !selection.old.iter().any(|o| o.body == old.body && o.feature == row.contact.feature);
             let c = &mut row.contact;
             if is_untouched {
-                (c.slides, c.slide_stiffness, c.slip) =
-                    (old.slides, old.slide_stiffness, tangent(&c.normal, &old.slip));
+                (c.secant, c.slip) = (old.secant, tangent(&c.normal, &old.slip));
                 row.gap += c.bias - old.bias;
                 c.bias = old.bias;
             }
@@ -339,8 +342,7 @@ fn begun(candidate: &Candidate, selection: &Selection<'_>) -> Contact {
         normal_force: 0.0,
         tangential_force: V3::zeros(),
         slip: V3::zeros(),
-        slides: false,
-        slide_stiffness: 0.0,
+        secant: 1.0,
         bias: candidate.gap.min(0.0),
         point: candidate.point,
         normal: candidate.normal,
