@@ -1,1 +1,40 @@
-//! stub
+//! What the system tests share: where the repository is, and its files.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+pub mod arrows;
+pub mod citations;
+
+/// Root of the repository.
+pub fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().expect("the crate lies in the repository")
+}
+
+/// Files below `folder` whose name ends in one of `extensions`, sorted; build output and hidden folders are left out.
+pub fn files(folder: &Path, extensions: &[&str]) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    collect(folder, extensions, &mut found);
+    found.sort();
+    found
+}
+
+/// Text of a file.
+pub fn read(path: &Path) -> String {
+    fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+fn collect(folder: &Path, extensions: &[&str], found: &mut Vec<PathBuf>) {
+    let entries = fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+    for entry in entries.flatten() {
+        let (path, name) = (entry.path(), entry.file_name());
+        let name = name.to_string_lossy();
+        if path.is_dir() {
+            if !name.starts_with('.') && !["target", "out", "__pycache__"].contains(&&*name) {
+                collect(&path, extensions, found);
+            }
+        } else if extensions.iter().any(|e| name.ends_with(e)) {
+            found.push(path);
+        }
+    }
+}

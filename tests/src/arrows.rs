@@ -1,0 +1,93 @@
+//! Who may depend on whom, and what the numerical crates may not name.
+
+use serde_json::Value;
+
+/// Crates of the workspace with those that each may depend on. A crate that is not listed is refused.
+pub const ALLOWED: [(&str, &[&str]); 9] = [
+    ("plica-protocol", &[]),
+    ("plica-geometry", &[]),
+    ("plica-sim", &["plica-geometry"]),
+    ("plica-accurate", &["plica-geometry"]),
+    ("plica-training", &["plica-sim", "plica-accurate", "plica-geometry"]),
+    ("plica-gpu", &["plica-sim"]),
+    // The client library is for the demo, which drives its tool over the bus as anybody would.
+    (
+        "plicad",
+        &[
+            "plica-protocol",
+            "plica-geometry",
+            "plica-sim",
+            "plica-accurate",
+            "plica-training",
+            "plica-gpu",
+            "plica-client",
+        ],
+    ),
+    ("plica-client", &["plica-protocol"]),
+    ("plica-tests", &["plica-protocol", "plica-client"]),
+];
+
+/// Crates that know no bus, no thread, no network and no clock.
+pub const PURE: [&str; 3] = ["plica-geometry", "plica-sim", "plica-accurate"];
+
+/// Libraries that pure crates never name.
+const IMPURE_LIBRARIES: [&str; 3] = ["zenoh", "tokio", "wgpu"];
+/// Modules of the standard library that pure crates never name.
+const IMPURE_MODULES: [&str; 2] = ["thread", "net"];
+/// Types that read a clock.
+const CLOCKS: [&str; 2] = ["Instant", "SystemTime"];
+
+/// Every dependency in the output of `cargo metadata --no-deps` that is not allowed, as a sentence.
+pub fn forbidden_arrows(metadata: &Value) -> Vec<String> {
+    let packages = metadata["packages"].as_array().map_or(&[][..], Vec::as_slice);
+    packages.iter().flat_map(forbidden_of_package).collect()
+}
+
+fn forbidden_of_package(package: &Value) -> Vec<String> {
+    let name = text(&package["name"]);
+    let Some((_, allowed)) = ALLOWED.iter().find(|(crate_name, _)| *crate_name == name) else {
+        return vec![format!("{name} is not in the list of crates: say in ALLOWED what it may depend on")];
+    };
+    let dependencies = package["dependencies"].as_array().map_or(&[][..], Vec::as_slice);
+    let mut refused = Vec::new();
+    for dependency in dependencies {
+        let target = text(&dependency["name"]);
+        let is_ours = dependency["path"].is_string() || ALLOWED.iter().any(|(c, _)| *c == target);
+        let is_impure = PURE.contains(&name) && IMPURE_LIBRARIES.contains(&target);
+        if is_impure || is_ours && !allowed.contains(&target) {
+            refused.push(format!("{name} -> {target} is not allowed"));
+        }
+    }
+    refused
+}
+
+/// What a source file of a pure crate names and may not. Comments and everything from `#[cfg(test)]` on do not count.
+pub fn impure_names(source: &str) -> Vec<String> {
+    let code: String = source.split("#[cfg(test)]").next().unwrap_or("").lines().map(without_comment).collect();
+    let words: Vec<&str> = code.split(|c: char| !(c.is_alphanumeric() || c == '_')).collect();
+    let banned = IMPURE_LIBRARIES.iter().chain(&CLOCKS).filter(|b| words.contains(b));
+    let mut found: Vec<String> = banned.map(ToString::to_string).collect();
+    for module in IMPURE_MODULES {
+        if std_paths(&code).any(|path| path.split(|c: char| !(c.is_alphanumeric() || c == '_')).any(|w| w == module)) {
+            found.push(format!("std::{module}"));
+        }
+    }
+    found
+}
+
+fn without_comment(line: &str) -> String {
+    let code = line.split("//").next().unwrap_or("");
+    format!("{} ", code.trim())
+}
+
+/// What follows each `std::`: the next name, or all that stands in the next braces.
+fn std_paths(code: &str) -> impl Iterator<Item = &str> {
+    code.split("std::").skip(1).map(|rest| match rest.trim_start().strip_prefix('{') {
+        Some(group) => group.split(';').next().unwrap_or(group),
+        None => rest.split(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or(rest),
+    })
+}
+
+fn text(value: &Value) -> &str {
+    value.as_str().unwrap_or("")
+}
