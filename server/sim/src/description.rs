@@ -74,7 +74,7 @@ pub struct SolverOptions {
 
 impl Default for SolverOptions {
     fn default() -> Self {
-        Self { preconditioner: Preconditioner::Auto, tolerance: 1e-3, max_iterations: 8, fallback_iterations: 20 }
+        Self { preconditioner: Preconditioner::Auto, tolerance: 1e-3, max_iterations: 16, fallback_iterations: 20 }
     }
 }
 
@@ -101,8 +101,10 @@ pub struct ContactOptions {
     pub activation_gap_m: f64,
     /// Time constant with which penetration found at a new contact is resolved [s].
     pub recovery_time_s: f64,
-    /// Most contact rows per tool or plane.
+    /// Most contact rows per tool.
     pub max_contacts: usize,
+    /// Most contact rows per plane: a support carries the whole object.
+    pub max_support_contacts: usize,
     /// Coulomb friction of the planes; tools carry their own.
     pub plane_friction: f64,
 }
@@ -115,6 +117,7 @@ impl Default for ContactOptions {
             activation_gap_m: 0.2e-3,
             recovery_time_s: 10e-3,
             max_contacts: 32,
+            max_support_contacts: 64,
             plane_friction: 0.5,
         }
     }

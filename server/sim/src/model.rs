@@ -188,6 +188,17 @@ impl Model {
         self.solids.len()
     }
 
+    /// Most contact rows of one body.
+    pub(crate) fn max_contacts(&self, body: usize) -> usize {
+        let options = &self.description.contact;
+        if body < self.n_tools() { options.max_contacts } else { options.max_support_contacts }
+    }
+
+    /// Most contact rows of all bodies together.
+    pub(crate) fn max_rows(&self) -> usize {
+        (0..self.n_bodies()).map(|b| self.max_contacts(b)).sum()
+    }
+
     /// Longest sparse row of the embedding.
     pub(crate) fn longest_row(&self) -> usize {
         (0..self.n_skin()).map(|v| self.embedding.row(v).0.len()).max().unwrap_or(0)

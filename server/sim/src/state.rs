@@ -40,7 +40,7 @@ impl State {
     /// The object at rest; tools are absent until their first pose.
     pub fn new(model: &Model) -> Self {
         let n_tools = model.n_tools();
-        let n_contacts = model.n_bodies() * model.description.contact.max_contacts;
+        let n_contacts = model.max_rows();
         Self {
             tick: 0,
             u: vec![[0.0; 4]; model.n_nodes()],

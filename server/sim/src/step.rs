@@ -146,7 +146,7 @@ fn find_contacts(model: &Model, state: &State, workspace: &mut Workspace, report
             friction: friction as f32,
             origin: placement.origin,
             activation_gap: options.activation_gap_m as f32,
-            max_contacts: options.max_contacts,
+            max_contacts: model.max_contacts(body),
             spacing: 0.35 * model.cell_size,
             dt: model.dt,
             inverse_mass: &model.surface.inverse_mass,

@@ -38,7 +38,6 @@ impl Workspace {
     /// Scratch for any state of this model.
     pub fn new(model: &Model) -> Self {
         let (n_nodes, n_free, n_batches) = (model.n_nodes(), model.n_free, model.elements.n_batches());
-        let max_contacts = model.description.contact.max_contacts;
         let nodes = || vec![[0.0; 4]; n_nodes];
         let planes = model
             .description
@@ -56,8 +55,8 @@ impl Workspace {
             dv_before: nodes(),
             residual_before: nodes(),
             detector: Detector::new(model.n_skin()),
-            rows: Rows::new(model.n_bodies(), max_contacts, model.longest_row()),
-            coupling: ContactCoupling::new(model.n_bodies(), max_contacts),
+            rows: Rows::new(model.max_rows(), model.longest_row()),
+            coupling: ContactCoupling::new(model.n_bodies(), model.max_rows()),
             motions: vec![ProxyMotion::prescribed(1.0, Vector6::zeros()); model.n_tools()],
             targets: vec![None; model.n_tools()],
             contact_points: vec![None; model.n_tools()],

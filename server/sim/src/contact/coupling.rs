@@ -16,8 +16,9 @@ pub(crate) struct ContactCoupling {
 }
 
 impl ContactCoupling {
-    pub(crate) fn new(n_bodies: usize, max_contacts: usize) -> Self {
-        Self { active: Vec::with_capacity(n_bodies * max_contacts), on_bodies: vec![Vector6::zeros(); n_bodies] }
+    /// `max_rows` is the most rows of all bodies together.
+    pub(crate) fn new(n_bodies: usize, max_rows: usize) -> Self {
+        Self { active: Vec::with_capacity(max_rows), on_bodies: vec![Vector6::zeros(); n_bodies] }
     }
 
     /// Prepares a pass: tools are factored, and `residual += h J^T f + h^2 J^T D P App^-1 r_p`.

@@ -307,7 +307,9 @@ impl Detector {
         let w1 = (tool_point - a).cross(&(c - a)).dot(&normal) * inverse;
         let w2 = (b - a).cross(&(tool_point - a)).dot(&normal) * inverse;
         let weights = [1.0 - w1 - w2, w1, w2];
-        if weights.iter().any(|w| *w < INTERIOR) {
+        // A sharp corner right above an edge is not seen by the edge, whose nearest face may be a side of the tool.
+        let interior = if radius > 0.0 { INTERIOR } else { 0.0 };
+        if weights.iter().any(|w| *w < interior) {
             return;
         }
         let distance = height * inverse.sqrt();

@@ -66,14 +66,15 @@ pub(crate) struct Rows {
     pub(crate) rows: Vec<Row>,
     nodes: Vec<u32>,
     weights: Vec<f32>,
-    /// Selection scratch: `(is not loaded, predicted gap, candidate, old contact)`.
+    /// Selection scratch.
     ranked: Vec<Ranked>,
     chosen: Vec<Ranked>,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Ranked {
-    is_loaded: bool,
+    /// Normal force of the old contact [N].
+    load: f32,
     predicted_gap: f32,
     candidate: u32,
     old: Option<u32>,
@@ -100,14 +101,14 @@ pub(crate) struct Selection<'a> {
 const HAND_OVER: f32 = 10e-3;
 
 impl Rows {
-    pub(crate) fn new(n_bodies: usize, max_contacts: usize, longest_row: usize) -> Self {
-        let n = n_bodies * max_contacts;
+    /// `n` is the most rows of all bodies together.
+    pub(crate) fn new(n: usize, longest_row: usize) -> Self {
         Self {
             rows: Vec::with_capacity(n),
             nodes: Vec::with_capacity(3 * n * longest_row),
             weights: Vec::with_capacity(3 * n * longest_row),
             ranked: Vec::with_capacity(4096),
-            chosen: Vec::with_capacity(max_contacts),
+            chosen: Vec::with_capacity(n + 1),
         }
     }
 
@@ -158,35 +159,51 @@ impl Rows {
             }
             let is_same = |o: &Contact| o.body == selection.body && o.feature == c.feature;
             let old = selection.old.iter().position(is_same);
-            let is_loaded = old.is_some_and(|o| selection.old[o].normal_force > 0.0);
+            let load = old.map_or(0.0, |o| selection.old[o].normal_force);
             let old = old.map(|o| o as u32);
-            self.ranked.push(Ranked { is_loaded, predicted_gap, candidate: index as u32, old });
+            self.ranked.push(Ranked { load, predicted_gap, candidate: index as u32, old });
         }
     }
 
-    /// All of them if they fit; else loaded ones, then the deepest ones at a distance from each other, then the deepest.
+    /// All of them if they fit. Else the deepest ones that no row holds yet (a quarter of the room), loaded ones at a
+    /// distance from each other that makes them fit, and the heaviest and deepest of the rest.
     fn choose(&mut self, candidates: &[Candidate], selection: &Selection<'_>) -> u32 {
         self.chosen.clear();
-        if self.ranked.len() <= selection.max_contacts {
+        let room = selection.max_contacts;
+        if self.ranked.len() <= room {
             self.chosen.extend_from_slice(&self.ranked);
             return 0;
         }
         self.ranked.sort_unstable_by(|a, b| {
-            let order = b.is_loaded.cmp(&a.is_loaded).then(a.predicted_gap.total_cmp(&b.predicted_gap));
+            let order = b.load.total_cmp(&a.load).then(a.predicted_gap.total_cmp(&b.predicted_gap));
             order.then(a.candidate.cmp(&b.candidate))
         });
-        let spacing_squared = selection.spacing * selection.spacing;
         let point = |r: &Ranked| candidates[r.candidate as usize].point;
-        for ranked in &self.ranked {
-            let is_apart = |other: &Ranked| (point(ranked) - point(other)).norm_squared() > spacing_squared;
-            if self.chosen.len() < selection.max_contacts && (ranked.is_loaded || self.chosen.iter().all(is_apart)) {
-                self.chosen.push(*ranked);
+        let is_apart = |chosen: &[Ranked], r: &Ranked, spacing: f32| {
+            chosen.iter().all(|c| (point(c) - point(r)).norm_squared() > spacing * spacing)
+        };
+        for r in self.ranked.iter().filter(|r| r.load <= 0.0 && r.predicted_gap < 0.0) {
+            if self.chosen.len() < room / 4 && is_apart(&self.chosen, r, selection.spacing) {
+                self.chosen.push(*r);
             }
         }
-        for ranked in &self.ranked {
-            let is_chosen = self.chosen.iter().any(|c| c.candidate == ranked.candidate);
-            if self.chosen.len() < selection.max_contacts && !is_chosen {
-                self.chosen.push(*ranked);
+        let n_violating = self.chosen.len();
+        let mut spacing = selection.spacing;
+        loop {
+            self.chosen.truncate(n_violating);
+            for r in self.ranked.iter().filter(|r| r.load > 0.0) {
+                if self.chosen.len() <= room && is_apart(&self.chosen[n_violating..], r, spacing) {
+                    self.chosen.push(*r);
+                }
+            }
+            if self.chosen.len() <= room {
+                break;
+            }
+            spacing *= 1.4;
+        }
+        for r in &self.ranked {
+            if self.chosen.len() < room && self.chosen.iter().all(|c| c.candidate != r.candidate) {
+                self.chosen.push(*r);
             }
         }
         (self.ranked.len() - self.chosen.len()) as u32
