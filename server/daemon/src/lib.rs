@@ -4,9 +4,16 @@
 //! become simulation types in [`wire`], and everything else moves bytes and time.
 
 pub mod bus;
+pub mod cli;
+pub mod commands;
 pub mod config;
+pub mod frames_file;
 pub mod limits;
+pub mod logging;
+pub mod motion;
 pub mod realtime;
+pub mod replay;
+pub mod roofline;
 pub mod scene;
 pub mod server;
 pub mod surface;

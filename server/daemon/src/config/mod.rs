@@ -90,6 +90,11 @@ impl Config {
         &self.object
     }
 
+    /// Replaces the element of the real-time model, to compare both in one scene.
+    pub fn set_element(&mut self, element: plica_sim::ElementKind) {
+        self.object.set_element(element);
+    }
+
     /// Tools in alphabetical order of their names.
     pub fn tools(&self) -> &[ToolDescription] {
         &self.tools

@@ -143,6 +143,9 @@ impl ObjectConfig {
     pub fn element(&self) -> ElementKind {
         self.element
     }
+    pub(super) fn set_element(&mut self, element: ElementKind) {
+        self.element = element;
+    }
     /// Implicit steps per tick.
     pub fn substeps(&self) -> u32 {
         self.substeps

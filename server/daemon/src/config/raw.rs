@@ -389,8 +389,10 @@ pub struct RawContact {
     pub activation_gap_m: f64,
     /// Time in which penetration found at a new contact is resolved [s], 1e-4 to 1.
     pub recovery_time_s: f64,
-    /// Most contact rows per tool or plane, 1 to 256.
+    /// Most contact rows per tool, 1 to 256.
     pub max_contacts: u32,
+    /// Most contact rows per plane of the supports, 1 to 1024.
+    pub max_support_contacts: u32,
     /// Coulomb friction of the planes [-], 0 to 2.
     pub plane_friction: f64,
 }
@@ -528,6 +530,7 @@ mod defaults {
                 activation_gap_m: d.activation_gap_m,
                 recovery_time_s: d.recovery_time_s,
                 max_contacts: d.max_contacts as u32,
+                max_support_contacts: d.max_support_contacts as u32,
                 plane_friction: d.plane_friction,
             }
         }

@@ -70,6 +70,7 @@ pub(super) fn check_contact(c: &Check<'_>, raw: &RawContact) -> Result<ContactOp
         activation_gap_m: c.number("contact.activation_gap_m", raw.activation_gap_m, 0.0, 0.01)?,
         recovery_time_s: c.number("contact.recovery_time_s", raw.recovery_time_s, 1e-4, 1.0)?,
         max_contacts: c.count("contact.max_contacts", raw.max_contacts, 1, 256)? as usize,
+        max_support_contacts: c.count("contact.max_support_contacts", raw.max_support_contacts, 1, 1024)? as usize,
         plane_friction: c.number("contact.plane_friction", raw.plane_friction, 0.0, 2.0)?,
     })
 }

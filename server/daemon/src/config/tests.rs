@@ -24,6 +24,24 @@ fn the_built_in_scene_is_the_wedge_of_the_design() {
     assert_eq!(config.runtime().timestep_s(), 1e-3);
 }
 
+/// The built-in scene writes out what it would get anyway, so that it documents the defaults.
+#[test]
+fn the_built_in_scene_writes_the_defaults() {
+    let config = Config::built_in().unwrap();
+    let bare = |text: &str, from: &str, to: &str| {
+        let (start, end) = (text.find(from).unwrap(), text.find(to).unwrap());
+        format!("{}{}", &text[..start], &text[end..])
+    };
+    let text = bare(BUILT_IN_SCENE, "[contact]", "[bench]");
+    let text = bare(&text, "[objects.wedge.coarse]", "[objects.wedge.skin]");
+    let bare = Config::parse(Path::new("bare.toml"), &text).unwrap();
+    assert_eq!(bare.contact(), config.contact());
+    assert_eq!(bare.sleep(), config.sleep());
+    assert_eq!(bare.object().solver(), config.object().solver());
+    assert_eq!(bare.object().substeps(), config.object().substeps());
+    assert_eq!(bare.runtime().realtime_priority(), config.runtime().realtime_priority());
+}
+
 #[test]
 fn the_peer_wedge_reads() {
     let text = include_str!("../../../../configs/scenes/peer-wedge.toml");

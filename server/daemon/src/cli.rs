@@ -1,0 +1,147 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use plica_protocol::{DEFAULT_ENDPOINT, DEFAULT_SESSION};
+
+use crate::bus::BusOptions;
+
+/// Simulates a soft object that tools touch, at 1 kHz, and serves it on a Zenoh bus.
+#[derive(Debug, Parser)]
+#[command(name = "plicad", version, about, max_term_width = 110)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+    /// Says more on standard error; twice: everything.
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub verbose: u8,
+    /// Prints one JSON object as the last line of standard output.
+    #[arg(long, global = true)]
+    pub json: bool,
+}
+
+/// What plicad can do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Runs a scene in real time and serves it on the bus until Ctrl-C.
+    Serve(ServeArgs),
+    /// Serves on loopback, drives the tool through a real client, prints a summary, writes a picture and a GLB.
+    Demo(DemoArgs),
+    /// Runs a scene along recorded poses, without bus or clock; the same input gives the same bytes.
+    Simulate(SimulateArgs),
+    /// Times the tick, stage by stage, beside the memory limit measured in the same run.
+    Bench(BenchArgs),
+    /// Says what a scene will cost, and whether it can be served.
+    Check(CheckArgs),
+    /// Prints the JSON Schema of scene files.
+    Schema,
+}
+
+/// Where the daemon is found.
+#[derive(Debug, Args)]
+pub struct BusArgs {
+    /// Zenoh endpoint to listen on.
+    #[arg(long, value_name = "ENDPOINT", help = format!("Zenoh endpoint to listen on [default: {DEFAULT_ENDPOINT}]"))]
+    pub listen: Option<String>,
+    /// Session name in every key: plica/v1/<SESSION>/...
+    #[arg(long, default_value = DEFAULT_SESSION)]
+    pub session: String,
+    /// Zenoh configuration (JSON5) in place of the built-in one, for TLS, access control, routers: see configs/zenoh.
+    #[arg(long, value_name = "FILE")]
+    pub zenoh_config: Option<PathBuf>,
+}
+
+impl BusArgs {
+    /// The same as options of the bus.
+    pub fn options(&self) -> BusOptions {
+        BusOptions {
+            listen: self.listen.clone(),
+            session: self.session.clone(),
+            zenoh_config: self.zenoh_config.clone(),
+        }
+    }
+}
+
+/// `plicad serve`.
+#[derive(Debug, Args)]
+pub struct ServeArgs {
+    /// Scene file; left out: the built-in wedge.
+    pub scene: Option<PathBuf>,
+    /// Where the daemon is found.
+    #[command(flatten)]
+    pub bus: BusArgs,
+    /// Ticks only when rpc/step says so.
+    #[arg(long)]
+    pub lock_step: bool,
+}
+
+/// `plicad simulate`.
+#[derive(Debug, Args)]
+pub struct SimulateArgs {
+    /// Scene file, or `wedge` for the built-in one.
+    pub scene: PathBuf,
+    /// Poses: CSV (time_s,tool,px,py,pz,qx,qy,qz,qw) or a TUM trajectory.
+    #[arg(long, value_name = "FILE")]
+    pub poses: PathBuf,
+    /// Result, a safetensors file.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// One frame every so many ticks.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    pub every: u64,
+    /// Maps the trajectory's box into the room above the object.
+    #[arg(long)]
+    pub fit: bool,
+    /// Tool of poses that name none; needed where the scene has several.
+    #[arg(long, value_name = "NAME")]
+    pub tool: Option<String>,
+}
+
+/// `plicad bench`.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// Scene file with a [bench] table, or `wedge` for the built-in one.
+    pub scene: PathBuf,
+    /// Ticks to time; the scene's motion is repeated.
+    #[arg(long, default_value_t = 3000, value_parser = clap::value_parser!(u64).range(100..=10_000_000))]
+    pub ticks: u64,
+    /// Element in place of the scene's.
+    #[arg(long)]
+    pub element: Option<Element>,
+}
+
+/// Elements by name.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+#[value(rename_all = "snake_case")]
+pub enum Element {
+    /// Bends without locking.
+    EnhancedStrain,
+    /// Trilinear with 2x2x2 points.
+    FullIntegration,
+}
+
+/// `plicad check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// Scene file, or `wedge` for the built-in one.
+    pub scene: PathBuf,
+}
+
+/// `plicad demo`.
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// Seconds of the scripted motion.
+    #[arg(long, default_value_t = 8.0)]
+    pub seconds: f64,
+    /// Poses to play in place of the scripted motion: CSV or TUM.
+    #[arg(long, value_name = "FILE")]
+    pub poses: Option<PathBuf>,
+    /// Maps the trajectory's box into the room above the object.
+    #[arg(long, requires = "poses")]
+    pub fit: bool,
+    /// Folder for picture and GLB.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub out: PathBuf,
+}

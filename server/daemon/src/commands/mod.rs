@@ -1,0 +1,33 @@
+//! One file per command.
+
+pub mod bench;
+pub mod check;
+pub mod demo;
+pub mod schema;
+pub mod serve;
+pub mod simulate;
+
+use std::path::Path;
+
+use crate::cli::{Cli, Command};
+use crate::config::{Config, ConfigError};
+
+/// Runs the command that was typed.
+pub fn run(cli: &Cli) -> anyhow::Result<()> {
+    match &cli.command {
+        Command::Serve(args) => serve::run(args, cli.json),
+        Command::Demo(args) => demo::run(args, cli.json),
+        Command::Simulate(args) => simulate::run(args, cli.json),
+        Command::Bench(args) => bench::run(args, cli.json),
+        Command::Check(args) => check::run(args, cli.json),
+        Command::Schema => schema::run(),
+    }
+}
+
+/// The scene of a path; `wedge`, where no such file exists, is the built-in one.
+fn scene(path: &Path) -> Result<Config, ConfigError> {
+    if path == Path::new("wedge") && !path.exists() {
+        return Config::built_in();
+    }
+    Config::from_file(path)
+}

@@ -1,0 +1,70 @@
+//! `plicad simulate`.
+
+use std::sync::Arc;
+
+use anyhow::Context;
+use indicatif::{ProgressBar, ProgressStyle};
+use plica_sim::NoProbe;
+
+use crate::cli::SimulateArgs;
+use crate::config::Config;
+use crate::frames_file::{FramesFile, Shape};
+use crate::motion::{self, TimedPose};
+use crate::replay::Replay;
+use crate::scene;
+
+/// Runs a scene along recorded poses and writes what came of it.
+pub fn run(args: &SimulateArgs, json: bool) -> anyhow::Result<()> {
+    let config = super::scene(&args.scene)?;
+    let (poses, fit) = motion::read(&args.poses, &config, args.tool.as_deref(), args.fit)?;
+    if let Some(fit) = fit {
+        tracing::info!("fitted by scale {:.4}, {:?} m to {:?} m", fit.scale, fit.from_m, fit.to_m);
+    }
+    let summary = simulate(&config, poses, args)?;
+    if json {
+        println!("{summary}");
+    } else {
+        let (frames, ticks) = (&summary["n_frames"], &summary["n_ticks"]);
+        println!("{}: {frames} frames of {ticks} ticks", args.out.display());
+    }
+    Ok(())
+}
+
+fn simulate(config: &Config, poses: Vec<TimedPose>, args: &SimulateArgs) -> anyhow::Result<serde_json::Value> {
+    let model = Arc::new(scene::build(config)?);
+    let n_ticks = ticks_to(poses.last().map_or(0.0, |p| p.time_s), model.timestep_s());
+    let n_frames = n_ticks / args.every;
+    anyhow::ensure!(n_frames > 0, "--every {} leaves no frame of {n_ticks} ticks; choose a smaller one", args.every);
+    let shape = Shape { n_frames: n_frames as usize, n_skin: model.n_skin(), n_tools: model.n_tools() };
+    let mut file = FramesFile::create(&args.out, shape).with_context(|| args.out.display().to_string())?;
+    let mut replay = Replay::new(model, poses);
+    let progress = bar(n_ticks)?;
+    for tick in 1..=n_ticks {
+        let wanted = tick % args.every == 0;
+        if wanted {
+            replay.want_frame();
+        }
+        replay.tick(&mut NoProbe);
+        if wanted {
+            let tools = replay.core().state().tools().to_vec();
+            file.write(replay.frame(), &tools).with_context(|| args.out.display().to_string())?;
+        }
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    file.finish().with_context(|| args.out.display().to_string())?;
+    Ok(serde_json::json!({
+        "scene": config.name(), "out": args.out, "n_ticks": n_ticks, "n_frames": n_frames,
+        "n_skin": shape.n_skin, "n_tools": shape.n_tools, "rollbacks": replay.core().state().rollbacks(),
+    }))
+}
+
+/// Ticks until the last pose has been used once.
+fn ticks_to(last_s: f64, timestep_s: f64) -> u64 {
+    1 + (last_s / timestep_s - 1e-6).ceil().max(0.0) as u64
+}
+
+fn bar(n_ticks: u64) -> anyhow::Result<ProgressBar> {
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} ticks, {eta} left")?;
+    Ok(ProgressBar::new(n_ticks).with_style(style))
+}

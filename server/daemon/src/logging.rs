@@ -1,0 +1,15 @@
+//! Log lines on standard error.
+
+use tracing_subscriber::EnvFilter;
+
+/// Starts logging; `RUST_LOG` wins over the number of `-v`.
+pub fn start(verbose: u8) {
+    let levels = match verbose {
+        0 => "warn,plicad=info,zenoh=error",
+        1 => "info,plicad=debug,zenoh=warn",
+        _ => "debug,plicad=trace",
+    };
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(levels));
+    // A second start, as in tests, changes nothing.
+    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_target(false).try_init();
+}

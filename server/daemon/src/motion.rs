@@ -1,0 +1,132 @@
+//! Recorded poses as input of a scene.
+
+use std::path::Path;
+
+use plica_client::trajectory::{self, Fit, TrackedPose, TrajectoryError, Workspace};
+use plica_protocol::pose::Pose;
+use plica_sim::{ToolDescription, ToolShape};
+
+use crate::config::{Config, MeshConfig};
+
+/// How far a fitted motion goes below the place of first touch [m], at most.
+const DEPTH_M: f64 = 0.008;
+/// How far it goes above that [m].
+const CLEARANCE_M: f64 = 0.03;
+
+/// Why poses cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum MotionError {
+    /// The file is not what it should be.
+    #[error(transparent)]
+    Trajectory(#[from] TrajectoryError),
+    /// A tool that the scene does not have.
+    #[error("{file}: there is no tool `{tool}` in the scene; it has: {known}")]
+    UnknownTool {
+        /// The pose file.
+        file: String,
+        /// The name.
+        tool: String,
+        /// The scene's tools.
+        known: String,
+    },
+    /// Poses without a tool's name, and several tools.
+    #[error("{file} names no tool, and the scene has {known}; choose one with --tool")]
+    WhichTool {
+        /// The pose file.
+        file: String,
+        /// The scene's tools.
+        known: String,
+    },
+}
+
+/// A pose and when it arrives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TimedPose {
+    /// Time [s].
+    pub time_s: f64,
+    /// Index of the tool.
+    pub tool: usize,
+    /// The pose, numbered from 1 on for each tool.
+    pub pose: Pose,
+}
+
+/// Reads poses for a scene, in order of time, and what `fit` did if it was asked for.
+pub fn read(
+    file: &Path,
+    config: &Config,
+    default_tool: Option<&str>,
+    fit: bool,
+) -> Result<(Vec<TimedPose>, Option<Fit>), MotionError> {
+    let mut tracked = trajectory::read(file)?;
+    let default_tool = which_tool(file, config, &tracked, default_tool)?;
+    let fitted = fit.then(|| trajectory::fit(&mut tracked, room_above(config, default_tool))).transpose()?;
+    let mut sequences = vec![0; config.tools().len()];
+    let mut poses = Vec::with_capacity(tracked.len());
+    for t in &tracked {
+        let tool = match &t.tool {
+            Some(name) => config.tool_index(name).ok_or_else(|| unknown_tool(file, config, name))?,
+            None => default_tool,
+        };
+        sequences[tool] += 1;
+        poses.push(TimedPose { time_s: t.time_s, tool, pose: pose(t, sequences[tool]) });
+    }
+    Ok((poses, fitted))
+}
+
+fn pose(tracked: &TrackedPose, sequence: u64) -> Pose {
+    Pose {
+        sequence,
+        source_time_ns: (tracked.time_s.max(0.0) * 1e9).round() as u64,
+        position_m: tracked.position_m,
+        orientation_xyzw: tracked.orientation_xyzw,
+        ..Pose::default()
+    }
+}
+
+fn which_tool(file: &Path, config: &Config, tracked: &[TrackedPose], asked: Option<&str>) -> Result<usize, MotionError> {
+    match asked {
+        Some(name) => config.tool_index(name).ok_or_else(|| unknown_tool(file, config, name)),
+        None if config.tools().len() == 1 || tracked.iter().all(|t| t.tool.is_some()) => Ok(0),
+        None => Err(MotionError::WhichTool { file: file.display().to_string(), known: known(config) }),
+    }
+}
+
+fn unknown_tool(file: &Path, config: &Config, tool: &str) -> MotionError {
+    MotionError::UnknownTool { file: file.display().to_string(), tool: tool.to_owned(), known: known(config) }
+}
+
+fn known(config: &Config) -> String {
+    let names: Vec<_> = config.tools().iter().map(|t| t.name.as_str()).collect();
+    if names.is_empty() { "no tools".into() } else { names.join(", ") }
+}
+
+/// The middle half of the object, from a press of [`DEPTH_M`] to [`CLEARANCE_M`] above the surface.
+pub fn room_above(config: &Config, tool: usize) -> Workspace {
+    let [x, y, _] = config.object().mesh().extents_m();
+    let top = top_height_m(config, 0.5 * x);
+    let touch = top + config.tools().get(tool).map_or(0.0, tip_radius_m);
+    let depth = DEPTH_M.min(0.3 * top);
+    Workspace {
+        min_m: [0.25 * x, 0.25 * y, touch - depth],
+        max_m: [0.75 * x, 0.75 * y, touch + CLEARANCE_M],
+    }
+}
+
+/// Height of the object's top above z = 0 at `x` [m].
+pub fn top_height_m(config: &Config, x: f64) -> f64 {
+    match config.object().mesh() {
+        MeshConfig::Wedge(wedge) => wedge.height_m(x),
+        MeshConfig::Block(size) => size[2],
+    }
+}
+
+/// How far a tool reaches below its origin [m].
+pub fn tip_radius_m(tool: &ToolDescription) -> f64 {
+    let lowest = |points: &mut dyn Iterator<Item = f64>| points.fold(0.0_f64, |low, z| low.max(-z));
+    match &tool.shape {
+        ToolShape::Ball { radius_m } | ToolShape::Capsule { radius_m, .. } => *radius_m,
+        ToolShape::Cuboid { half_extents_m } => half_extents_m[2],
+        ToolShape::ConvexHull { points_m } => lowest(&mut points_m.iter().map(|p| p.z)),
+        ToolShape::Compound { hulls_m } => lowest(&mut hulls_m.iter().flatten().map(|p| p.z)),
+    }
+}
