@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use plica_tests::arrows::{ALLOWED, PURE, forbidden_arrows, impure_names};
+use plica_tests::arrows::{ALLOWED, PURE, code_of, forbidden_arrows, impure_names};
 use plica_tests::{files, read, repository};
 use serde_json::{Value, json};
 
@@ -63,6 +63,37 @@ fn an_impure_name_is_found() {
     assert_eq!(impure_names("zenoh::open(c)"), ["zenoh"]);
     assert_eq!(impure_names("// zenoh, std::thread\nlet threads = network;\n"), [""; 0]);
     assert_eq!(impure_names("fn f() {}\n#[cfg(test)]\nmod tests { use std::time::Instant; }"), [""; 0]);
+}
+
+/// Sources of the daemon, its tests left out, that hold a text and do not lie in a place (a folder or a file).
+fn outside(place: &str, text: &str) -> Vec<PathBuf> {
+    let sources = repository().join("server/daemon/src");
+    let found = files(&sources, &[".rs"]).into_iter().filter(|path| !path.starts_with(sources.join(place)));
+    let found = found.filter(|path| !path.ends_with("tests.rs"));
+    found.filter(|path| code_of(&read(path)).contains(text)).collect()
+}
+
+#[test]
+fn only_the_bus_folder_touches_zenoh() {
+    assert_eq!(outside("bus", "zenoh::"), Vec::<PathBuf>::new());
+}
+
+#[test]
+fn only_one_file_makes_simulation_types_of_wire_types() {
+    for made in ["PoseSample {", " Wrench {"] {
+        assert_eq!(outside("wire.rs", made), Vec::<PathBuf>::new(), "{made}");
+    }
+}
+
+#[test]
+fn the_simulation_thread_knows_no_bus_lock_or_log() {
+    for path in files(&repository().join("server/daemon/src/realtime"), &[".rs"]) {
+        let code = code_of(&read(&path));
+        for banned in ["zenoh", "plica_protocol", "plica_client", "Mutex", "RwLock", "tracing::", "print!", "println!"]
+        {
+            assert!(!code.contains(banned), "{} names {banned}", path.display());
+        }
+    }
 }
 
 #[test]

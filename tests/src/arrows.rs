@@ -63,7 +63,7 @@ fn forbidden_of_package(package: &Value) -> Vec<String> {
 
 /// What a source file of a pure crate names and may not. Comments and everything from `#[cfg(test)]` on do not count.
 pub fn impure_names(source: &str) -> Vec<String> {
-    let code: String = source.split("#[cfg(test)]").next().unwrap_or("").lines().map(without_comment).collect();
+    let code = code_of(source);
     let words: Vec<&str> = code.split(|c: char| !(c.is_alphanumeric() || c == '_')).collect();
     let banned = IMPURE_LIBRARIES.iter().chain(&CLOCKS).filter(|b| words.contains(b));
     let mut found: Vec<String> = banned.map(ToString::to_string).collect();
@@ -73,6 +73,11 @@ pub fn impure_names(source: &str) -> Vec<String> {
         }
     }
     found
+}
+
+/// Source without comments and without everything from `#[cfg(test)]` on, in one line.
+pub fn code_of(source: &str) -> String {
+    source.split("#[cfg(test)]").next().unwrap_or("").lines().map(without_comment).collect()
 }
 
 fn without_comment(line: &str) -> String {

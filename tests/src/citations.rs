@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-/// Keys cited in a text: capital first, letters, two digits of the year, perhaps a letter; `[MG04]`, `[Saad03, alg. 9.1]`.
+/// Keys cited in a text: initials or a name, two digits of the year, perhaps a letter; `[MG04]`, `[Saad03, alg. 9.1]`.
 pub fn cited_keys(text: &str) -> BTreeSet<String> {
     text.split('[').skip(1).filter_map(key_at_start).collect()
 }
@@ -30,7 +30,11 @@ fn key_at_start(rest: &str) -> Option<String> {
     let digits = rest[letters..].chars().take_while(char::is_ascii_digit).count();
     let suffix = usize::from(rest[letters + digits..].starts_with(|c: char| c.is_ascii_lowercase()));
     let (key, after) = rest.split_at(letters + digits + suffix);
-    let is_key = letters >= 2 && digits == 2 && key.starts_with(|c: char| c.is_ascii_uppercase());
+    // Initials of several authors, or one author's name; not `AtomicU64`.
+    let (name, lower) = (&rest[..letters], |c: char| c.is_ascii_lowercase());
+    let is_name = name.chars().all(|c| c.is_ascii_uppercase())
+        || name.starts_with(|c: char| c.is_ascii_uppercase()) && name.chars().skip(1).all(lower);
+    let is_key = letters >= 2 && digits == 2 && is_name;
     (is_key && after.starts_with([']', ',', '\\'])).then(|| key.to_owned())
 }
 
