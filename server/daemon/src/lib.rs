@@ -11,6 +11,7 @@ pub mod frames_file;
 pub mod limits;
 pub mod logging;
 pub mod motion;
+pub mod picture;
 pub mod realtime;
 pub mod replay;
 pub mod roofline;

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use plica_sim::{Model, Probe, TickReport};
+use plica_sim::{Model, TickReport};
 
 use crate::motion::TimedPose;
-use crate::realtime::{Frame, Loop, LoopOptions, Ports, Turn};
+use crate::realtime::{Frame, Loop, LoopOptions, Ports, Turn, TurnProbe};
 use crate::wire;
 
 /// A loop that is told its poses by time.
@@ -24,7 +24,7 @@ impl Replay {
     }
 
     /// Takes one tick: the poses whose time has come arrive first.
-    pub fn tick(&mut self, probe: &mut impl Probe) -> TickReport {
+    pub fn tick(&mut self, probe: &mut impl TurnProbe) -> TickReport {
         self.deliver();
         self.turn(probe)
     }
@@ -41,7 +41,7 @@ impl Replay {
     }
 
     /// Takes one tick with what has been delivered.
-    pub fn turn(&mut self, probe: &mut impl Probe) -> TickReport {
+    pub fn turn(&mut self, probe: &mut impl TurnProbe) -> TickReport {
         match self.core.turn(probe) {
             Turn::Ticked(report) => report,
             Turn::Still => TickReport::default(),

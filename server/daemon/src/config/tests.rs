@@ -63,7 +63,7 @@ fn every_bad_file_gives_one_clear_message() {
         ("divisions = [8, 4, 4]", "divisions = [8, 4]", &["coarse.divisions", "length"]),
         ("faces = [\"z_min\"]", "faces = [\"bottom\"]", &["fixed", "unknown variant `bottom`", "z_min"]),
         ("planes = []", "planes = [{ point_m = [0, 0, 0], normal = [0, 0, 0] }]", &["planes.0.normal", "floor"]),
-        ("spacing_m = 0.00189", "spacing_m = 0.00011", &["skin.spacing_m", "at most 300000"]),
+        ("spacing_m = 0.00122", "spacing_m = 0.00011", &["skin.spacing_m", "at most 300000"]),
         ("publish_hz = 90.0", "publish_hz = 2000.0", &["publish.publish_hz", "1 to 1000"]),
         ("format = \"f32\"", "format = \"f16\"", &["unknown variant `f16`", "`i16`"]),
         ("friction = 0.8", "friction = 3.0", &["tools.probe.friction", "0 to 2"]),

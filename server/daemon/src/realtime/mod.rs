@@ -24,7 +24,7 @@ pub use histogram::{AtomicHistogram, Summary};
 pub use pacing::{MAX_CATCH_UP, Pacer, Plan};
 pub use ports::{CommandPort, FramePort, Ports, WrenchPort};
 pub use privileges::Grants;
-pub use stage_timer::StageTimer;
+pub use stage_timer::{StageTimer, TurnProbe};
 pub use statistics::Statistics;
 pub use thread::{Pace, Running, ThreadOptions, spawn};
 pub use turn::{Loop, LoopOptions, MAX_STEP_POSES, Turn};

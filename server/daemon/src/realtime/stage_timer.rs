@@ -6,6 +6,14 @@ use plica_sim::{Probe, Stage};
 
 use super::Statistics;
 
+/// A probe that is also told when the simulation's last stage is over.
+pub trait TurnProbe: Probe {
+    /// The tick is over; what follows is handing it out.
+    fn leave(&mut self) {}
+}
+
+impl TurnProbe for plica_sim::NoProbe {}
+
 /// A probe that adds up the time spent in each stage; stages that alternate are summed.
 #[derive(Debug)]
 pub struct StageTimer {
@@ -20,14 +28,12 @@ impl StageTimer {
         Self { current: None, since: Instant::now(), sums_ns: [0; Stage::ALL.len()] }
     }
 
-    /// Ends the last stage; the time of each stage since the last call [ns].
+    /// The time of each stage since the last call [ns].
     pub fn take_ns(&mut self) -> [u64; Stage::ALL.len()] {
-        self.close(Instant::now());
-        self.current = None;
         std::mem::take(&mut self.sums_ns)
     }
 
-    /// Ends the last stage and records all of them.
+    /// Records all stages.
     pub fn record(&mut self, statistics: &Statistics) {
         for (histogram, ns) in statistics.stages.iter().zip(self.take_ns()) {
             histogram.record(ns);
@@ -46,6 +52,13 @@ impl StageTimer {
 impl Default for StageTimer {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+impl TurnProbe for StageTimer {
+    fn leave(&mut self) {
+        self.close(Instant::now());
+        self.current = None;
     }
 }
 

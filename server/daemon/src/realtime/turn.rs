@@ -3,13 +3,13 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
-use plica_sim::{Model, PoseSample, Probe, State, TickInput, TickReport, ToolPose, Workspace};
+use plica_sim::{Model, PoseSample, State, TickInput, TickReport, ToolPose, Workspace};
 use triple_buffer::triple_buffer;
 
 use super::outbox::{Cadences, Outbox, ToolOutlet};
 use super::snapshots::Snapshots;
 use super::{
-    Command, CommandPort, Frame, FramePort, Outcome, Ports, Reading, Refusal, Reply, Statistics, Waker, WrenchPort,
+    Command, CommandPort, Frame, FramePort, Outcome, Ports, Reading, Refusal, Reply, Statistics, TurnProbe, Waker, WrenchPort,
 };
 
 /// Poses per tool that may wait for a tick.
@@ -111,7 +111,7 @@ impl Loop {
     }
 
     /// Obeys orders and, unless the simulation stands still, takes one tick.
-    pub fn turn(&mut self, probe: &mut impl Probe) -> Turn {
+    pub fn turn(&mut self, probe: &mut impl TurnProbe) -> Turn {
         self.obey_orders();
         if self.stands_still() {
             return self.stay();
@@ -154,7 +154,7 @@ impl Loop {
     }
 
     /// Runs ticks on a state that is thrown away, so that every page has been touched.
-    pub fn warm_up(&mut self, probe: &mut impl Probe) {
+    pub fn warm_up(&mut self, probe: &mut impl TurnProbe) {
         let mut state = self.rest.clone();
         for _ in 0..20 {
             let input = TickInput { clock_s: state.sim_time_s(), poses: &[] };
@@ -192,9 +192,10 @@ impl Loop {
         self.poses.extend(self.step_poses.drain(..).take(MAX_STEP_POSES));
     }
 
-    fn tick(&mut self, probe: &mut impl Probe) {
+    fn tick(&mut self, probe: &mut impl TurnProbe) {
         let input = TickInput { clock_s: self.state.sim_time_s(), poses: &self.poses };
         self.report = plica_sim::tick(&self.model, input, &mut self.state, &mut self.workspace, probe);
+        probe.leave();
     }
 
     fn hand_out(&mut self) {
