@@ -100,6 +100,8 @@ pub struct Model {
     pub(crate) size: f32,
     /// Length of a sub-step [s].
     pub(crate) dt: f32,
+    /// Least inverse mass that a contact row is given [1/kg].
+    pub(crate) inverse_mass_floor: f32,
 }
 
 impl Model {
@@ -127,7 +129,9 @@ impl Model {
         let jacobi = BlockJacobi::new(&matrix);
         let embedding = SkinEmbedding::new(&d.skin, &d.embedding, &order.internal_of_mesh, n_free);
         let inverse_mass = inverse_masses(&embedding, n_free, tridiagonal.as_ref(), &jacobi);
+        let mean_inverse_mass = inverse_mass.iter().sum::<f32>() / inverse_mass.len() as f32;
         Ok(Self {
+            inverse_mass_floor: 0.05 * mean_inverse_mass,
             elements: ElementBatches::new(&d.mesh, &order.internal_of_mesh, &d.materials, d.element),
             node_mass: mass[..n_free].iter().map(|&m| m as f32).collect(),
             surface: SkinSurface::new(&d.skin, inverse_mass),

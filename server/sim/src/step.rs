@@ -166,7 +166,8 @@ fn find_contacts(model: &Model, state: &State, workspace: &mut Workspace, report
 /// Displacements before the solve, stiffness, and which rows are expected to push.
 ///
 /// Stiffness `kappa / (h^2 w o)`: `1 / (h^2 w)` is what the skin point itself resists with, mass included, so that nothing
-/// depends on Young's modulus or the time step; `o` counts the rows that load the same place.
+/// depends on Young's modulus or the time step; `o` counts the rows that load the same place. A floor on `w` keeps points
+/// next to fixed nodes from becoming infinitely stiff.
 fn predict_rows(model: &Model, rows: &mut Rows, motions: &[ProxyMotion]) {
     let (h, kappa) = (model.dt, model.description.contact.stiffness_ratio as f32);
     for row in &mut rows.rows {
@@ -176,7 +177,7 @@ fn predict_rows(model: &Model, rows: &mut Rows, motions: &[ProxyMotion]) {
     }
     for index in 0..rows.rows.len() {
         let row = &rows.rows[index];
-        let yields = row.inverse_mass;
+        let yields = row.inverse_mass.max(model.inverse_mass_floor);
         let crowd = rows.crowding(index, model.cell_size);
         rows.rows[index].stiffness = kappa / (h * h * yields * crowd);
         predict_secant(&mut rows.rows[index]);
