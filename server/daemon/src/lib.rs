@@ -7,6 +7,7 @@ pub mod bus;
 pub mod cli;
 pub mod commands;
 pub mod config;
+pub mod demo;
 pub mod frames_file;
 pub mod limits;
 pub mod logging;
