@@ -48,8 +48,9 @@ fn every_path_in_a_document_exists() {
 
 #[test]
 fn keys_and_paths_are_recognised() {
-    let keys =
-        cited_keys(r"see [MG04], [Saad03, alg. 9.1] and \[KMBG09\]; not [N/m], [u32], [V3], [f64; 24], [n_nodes], [AtomicU64]");
+    let keys = cited_keys(
+        r"see [MG04], [Saad03, alg. 9.1] and \[KMBG09\]; not [N/m], [u32], [V3], [f64; 24], [n_nodes], [AtomicU64]",
+    );
     assert_eq!(keys.into_iter().collect::<Vec<_>>(), ["KMBG09", "MG04", "Saad03"]);
     let bibliography = "@book{Saad03,\n  title = {x},\n}\n@inproceedings{MG04,\n}\n";
     assert_eq!(bibliography_keys(bibliography).len(), 2);

@@ -11,6 +11,18 @@ pub fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().expect("the crate lies in the repository")
 }
 
+/// A program of this project, built in the same profile as the tests.
+///
+/// # Panics
+/// If it has not been built: `tests/run` does so first.
+pub fn program(name: &str) -> PathBuf {
+    let test = std::env::current_exe().expect("a running test has a file");
+    let folder = test.parent().and_then(Path::parent).expect("tests lie in deps/ beside the programs");
+    let path = folder.join(name).with_extension(std::env::consts::EXE_EXTENSION);
+    assert!(path.exists(), "{} is missing: run `cargo build --release --workspace --bins` first", path.display());
+    path
+}
+
 /// Files below `folder` whose name ends in one of `extensions`, sorted; build output and hidden folders are left out.
 pub fn files(folder: &Path, extensions: &[&str]) -> Vec<PathBuf> {
     let mut found = Vec::new();

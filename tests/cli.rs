@@ -1,0 +1,282 @@
+//! The programs from outside: what they print, what they write, how they refuse.
+#![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+use std::fmt::Write as _;
+use std::fs;
+use std::net::TcpListener;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use plica_tests::{program, read, repository};
+use serde_json::Value;
+use tempfile::TempDir;
+
+fn plicad(arguments: &[&str]) -> Output {
+    Command::new(program("plicad")).args(arguments).current_dir(repository()).output().unwrap()
+}
+
+/// The one JSON object on the last line of standard output.
+fn last_line(output: &Output) -> Value {
+    let (text, errors) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{errors}");
+    serde_json::from_str(text.lines().last().unwrap_or_default()).unwrap_or_else(|e| panic!("{e}: {text}{errors}"))
+}
+
+fn errors(output: &Output) -> String {
+    assert!(!output.status.success(), "it was not refused");
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Presses the wedge 4 mm, drags, and lifts: 0.4 s at 250 Hz.
+fn write_poses(path: &Path) {
+    let mut text = "time_s,tool,px,py,pz,qx,qy,qz,qw\n".to_owned();
+    for i in 0..=100 {
+        let share = f64::from(i) / 100.0;
+        let (x, z) = (0.05 + 0.005 * share, 0.0355 - 0.005 * (std::f64::consts::PI * share).sin());
+        writeln!(text, "{},probe,{x},0.03,{z},0,0,0,1", f64::from(i) * 0.004).unwrap();
+    }
+    fs::write(path, text).unwrap();
+}
+
+fn simulate(poses: &Path, out: &Path) -> Value {
+    let (poses, out) = (poses.to_str().unwrap(), out.to_str().unwrap());
+    last_line(&plicad(&["simulate", "wedge", "--poses", poses, "--out", out, "--every", "5", "--json"]))
+}
+
+/// Header of a safetensors file: names with type and shape.
+fn tensors(file: &[u8]) -> Value {
+    let n = u64::from_le_bytes(file[..8].try_into().unwrap()) as usize;
+    serde_json::from_slice(&file[8..8 + n]).unwrap()
+}
+
+#[test]
+fn simulating_twice_gives_the_same_bytes() {
+    let folder = TempDir::new().unwrap();
+    let (poses, first, second) =
+        (folder.path().join("poses.csv"), folder.path().join("1.safetensors"), folder.path().join("2.safetensors"));
+    write_poses(&poses);
+    let summary = simulate(&poses, &first);
+    simulate(&poses, &second);
+    let (first, second) = (fs::read(first).unwrap(), fs::read(second).unwrap());
+    assert!(first == second, "two runs differ");
+
+    let header = tensors(&first);
+    let shape =
+        |name: &str| header[name]["shape"].as_array().unwrap_or_else(|| panic!("no `{name}`: {header}")).clone();
+    let n_frames = shape("time_s")[0].clone();
+    assert_eq!(shape("positions")[0], n_frames);
+    assert_eq!(shape("positions")[2], 3);
+    assert_eq!(shape("tick"), [n_frames.clone()]);
+    assert_eq!(shape("confidence")[0], n_frames);
+    assert_eq!(shape("force"), [n_frames.clone(), 1.into(), 3.into()]);
+    assert_eq!(shape("proxy"), [n_frames.clone(), 1.into(), 7.into()]);
+    assert_eq!(n_frames, 80, "one frame every five of 401 ticks; {summary}");
+    assert_eq!(summary["rollbacks"], 0);
+}
+
+#[test]
+fn a_recorded_hand_motion_is_simulated() {
+    let recorded = repository().join("../shared/data/poses/handheld_xyz.tum");
+    if !recorded.exists() {
+        println!("skipped: no recorded motion beside the repository");
+        return;
+    }
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("hand.safetensors");
+    let (recorded, out) = (recorded.to_str().unwrap(), out.to_str().unwrap());
+    let arguments = ["simulate", "wedge", "--poses", recorded, "--fit", "--out", out, "--every", "100", "--json"];
+    let summary = last_line(&plicad(&arguments));
+    assert_eq!(summary["rollbacks"], 0, "{summary}");
+    assert!(summary["n_frames"].as_u64().unwrap() > 100, "{summary}");
+}
+
+#[test]
+fn check_says_what_a_scene_costs() {
+    for scene in ["wedge", "configs/scenes/wedge.toml", "configs/scenes/peer-wedge.toml"] {
+        let said = last_line(&plicad(&["check", scene, "--json"]));
+        assert_eq!(said["n_hexes"], 128, "{said}");
+        let n_skin = said["n_skin"].as_u64().unwrap();
+        assert!((6_000..8_000).contains(&n_skin), "about 6.9 k vertices: {said}");
+        assert!(said["frame_bytes"].as_u64().unwrap() >= 64 + 12 * n_skin, "{said}");
+    }
+    let spoken = plicad(&["check", "wedge"]);
+    assert!(String::from_utf8_lossy(&spoken.stdout).contains("128 hexahedra"));
+}
+
+#[test]
+fn the_schema_is_json_and_knows_the_tables() {
+    let output = plicad(&["schema"]);
+    let schema: Value = serde_json::from_slice(&output.stdout).unwrap();
+    for table in ["objects", "tools", "contact", "runtime"] {
+        assert!(schema["properties"][table].is_object(), "no `{table}`");
+    }
+}
+
+/// Wedge with one line changed: what was typed, what it becomes, and what the message must say.
+const BAD_SCENES: [(&str, &str, &[&str]); 7] = [
+    ("young_modulus_pa = 3e4", "young_modulus = 3e4", &["young_modulus", "young_modulus_pa"]),
+    ("poisson_ratio = 0.45", "poisson_ratio = 0.6", &["poisson_ratio", "0.6", "0 to 0.499"]),
+    ("poisson_ratio = 0.45", "poisson_ratio = \"soft\"", &["poisson_ratio"]),
+    ("thin_height_m = 0.01", "thin_height_m = -1.0", &["thin_height_m", "-1"]),
+    ("friction = 0.8", "friction = nan", &["friction"]),
+    ("timestep_s = 0.001", "timestep_s = 1.0", &["timestep_s", "0.02"]),
+    ("[tools.probe]", "[tools.\"a/b\"]", &["a/b"]),
+];
+
+#[test]
+fn bad_scene_files_name_file_line_key_and_range() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("scene.toml");
+    let good = read(&repository().join("configs/scenes/wedge.toml"));
+    for (typed, becomes, expected) in BAD_SCENES {
+        let line = 1 + good.lines().position(|l| l.starts_with(typed)).unwrap_or_else(|| panic!("no `{typed}`"));
+        let bad = good.replacen(&format!("\n{typed}"), &format!("\n{becomes}"), 1);
+        fs::write(&path, bad).unwrap();
+        let message = errors(&plicad(&["check", path.to_str().unwrap()]));
+        assert_eq!(message.trim().lines().count(), 1, "one clear message: {message}");
+        assert!(message.contains(&format!("scene.toml:{line}")), "file and line {line}: {message}");
+        for part in expected {
+            assert!(message.contains(part), "`{part}` in: {message}");
+        }
+    }
+    fs::write(&path, "[objects").unwrap();
+    assert!(errors(&plicad(&["check", path.to_str().unwrap()])).contains("scene.toml:1"));
+    assert!(errors(&plicad(&["check", "no/such.toml"])).contains("no/such.toml"));
+}
+
+#[test]
+fn bad_pose_files_are_named() {
+    let folder = TempDir::new().unwrap();
+    let (poses, out) = (folder.path().join("poses.csv"), folder.path().join("out.safetensors"));
+    let header = "time_s,tool,px,py,pz,qx,qy,qz,qw\n";
+    let run = |text: &str| {
+        fs::write(&poses, text).unwrap();
+        let (poses, out) = (poses.to_str().unwrap(), out.to_str().unwrap());
+        errors(&plicad(&["simulate", "wedge", "--poses", poses, "--out", out]))
+    };
+    for (rows, expected) in [
+        ("0,probe,0,0,0,0,0,0\n", ":2"),
+        ("0,probe,0,0,0.1,0,0,0,1\n0.1,probe,x,0,0,0,0,0,1\n", ":3"),
+        ("0,knife,0,0,0.1,0,0,0,1\n", "knife"),
+        ("0,probe,NaN,0,0.1,0,0,0,1\n", ":2"),
+        ("0.2,probe,0,0,0.1,0,0,0,1\n0.1,probe,0,0,0.1,0,0,0,1\n", ":3"),
+        ("0,probe,0,0,0.1,0,0,0,7\n", ":2"),
+    ] {
+        let message = run(&format!("{header}{rows}"));
+        assert!(message.contains("poses.csv") && message.contains(expected), "`{expected}` in: {message}");
+        assert!(!out.exists(), "nothing is written for a bad pose file: {rows}");
+    }
+}
+
+#[test]
+fn bench_reports_every_stage() {
+    let said = last_line(&plicad(&["bench", "wedge", "--ticks", "300", "--json"]));
+    let is_spread = |v: &Value| ["min", "p50", "p99"].iter().all(|k| v[k].as_f64().is_some_and(|us| us >= 0.0));
+    assert_eq!(said["scene"], "wedge");
+    assert!(is_spread(&said["tick_us"]), "{said}");
+    for stage in ["poses", "contact", "solve", "embedding", "gates"] {
+        assert!(is_spread(&said["stages"][stage]), "{stage}: {said}");
+    }
+    assert!(said["roofline_ratio"].as_f64().unwrap() > 0.0, "{said}");
+}
+
+#[test]
+fn the_demo_reports_and_writes_a_picture_and_a_mesh() {
+    let folder = TempDir::new().unwrap();
+    let said = last_line(&plicad(&["demo", "--seconds", "2", "--out", folder.path().to_str().unwrap(), "--json"]));
+    let number = |v: &Value| v.as_f64().unwrap_or_else(|| panic!("{said}"));
+    assert!(number(&said["ticks"]) > 500.0);
+    for quantile in ["p50", "p99", "p999"] {
+        assert!(number(&said["tick_us"][quantile]) > 0.0);
+    }
+    assert!(number(&said["overruns"]) >= 0.0);
+    assert!(number(&said["frames_received"]) > 10.0, "{said}");
+    assert!(number(&said["max_penetration_m"]) < 1e-2 && number(&said["peak_force_n"]) > 0.1, "{said}");
+    let start = |key: &str| fs::read(repository().join(said[key].as_str().unwrap())).unwrap()[..4].to_vec();
+    assert_eq!(start("picture"), b"\x89PNG");
+    assert_eq!(start("glb"), b"glTF");
+}
+
+/// `plicad serve` on a free port; ended when dropped.
+struct Daemon {
+    process: Child,
+    endpoint: String,
+}
+
+impl Daemon {
+    fn start() -> Self {
+        let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        let endpoint = format!("tcp/127.0.0.1:{port}");
+        let mut command = Command::new(program("plicad"));
+        let process = command.args(["serve", "--listen", &endpoint]).stderr(Stdio::null()).spawn().unwrap();
+        let daemon = Self { process, endpoint };
+        let deadline = Instant::now() + Duration::from_secs(60);
+        while !daemon.plica(&["status"]).status.success() {
+            assert!(Instant::now() < deadline, "plicad never answered");
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        daemon
+    }
+
+    fn plica(&self, arguments: &[&str]) -> Output {
+        let mut command = Command::new(program("plica"));
+        command.args(arguments).args(["--connect", &self.endpoint, "--json"]).output().unwrap()
+    }
+
+    fn ask(&self, arguments: &[&str]) -> Value {
+        last_line(&self.plica(arguments))
+    }
+}
+
+impl Drop for Daemon {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+#[test]
+fn the_client_command_works_with_the_daemon() {
+    let daemon = Daemon::start();
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    assert_eq!(daemon.ask(&["status"])["scene"], "wedge");
+
+    let pressed = daemon.ask(&["probe", "--seconds", "1", "--period-s", "1", "--rate-hz", "250"]);
+    assert!(pressed["peak_force_n"].as_f64().unwrap() > 0.1, "{pressed}");
+    let latency = daemon.ask(&["latency", "--seconds", "1", "--rate-hz", "200"]);
+    assert!(latency["motion_to_force_us"]["p50"].as_f64().unwrap() < 1e6, "{latency}");
+    println!("motion to force over loopback: {}", latency["motion_to_force_us"]);
+
+    daemon.ask(&["export", "--mesh", &path("wedge.glb"), "--skin", &path("wedge.plsk")]);
+    assert_eq!(fs::read(path("wedge.glb")).unwrap()[..4], *b"glTF");
+    assert_eq!(fs::read(path("wedge.plsk")).unwrap()[..4], *b"PLSK");
+
+    assert_eq!(daemon.ask(&["rpc", "pause"])["paused"], true);
+    assert_eq!(daemon.ask(&["rpc", "reset"])["tick"], 0);
+    assert_eq!(daemon.ask(&["rpc", "step", r#"{"ticks": 7}"#])["tick"], 7);
+    assert!(!daemon.plica(&["rpc", "explode"]).status.success());
+}
+
+#[test]
+fn a_recording_replayed_and_recorded_again_holds_the_same_poses() {
+    let daemon = Daemon::start();
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let record = |file: &str| {
+        let mut command = Command::new(program("plica"));
+        command.args(["record", file, "--seconds", "4", "--connect", &daemon.endpoint, "--json"]);
+        let recorder = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(1000)); // it connects and subscribes
+        recorder
+    };
+    let recorder = record(&path("1.mcap"));
+    let sent = daemon.ask(&["probe", "--seconds", "1", "--rate-hz", "250"]);
+    let first = last_line(&recorder.wait_with_output().unwrap());
+    let recorder = record(&path("2.mcap"));
+    daemon.ask(&["replay", &path("1.mcap")]);
+    let second = last_line(&recorder.wait_with_output().unwrap());
+    assert_eq!(first["poses"], sent["poses"], "{first}");
+    assert_eq!(first["poses"], second["poses"], "{second}");
+}
