@@ -13,6 +13,9 @@ use crate::embedding::SkinPositions;
 /// Features closer than this share of an edge to its end are left to the end.
 const INTERIOR: f32 = 0.05;
 
+/// Edges are taken to be this much longer than at rest before their true length is looked at.
+const STRETCH: f32 = 1.5;
+
 /// Normals that point out of the skin by more than this cosine belong to the far side of the tool.
 const FAR_SIDE: f32 = 0.3;
 
@@ -59,6 +62,11 @@ impl Detector {
     /// Clusters of the last call to [`Self::find`].
     pub(crate) fn near_clusters(&self) -> &[u32] {
         &self.near_clusters
+    }
+
+    /// Signed distance of a vertex in the last call to [`Self::find`]; infinite if it was not near.
+    pub(crate) fn distance(&self, vertex: u32) -> f32 {
+        self.distances[vertex as usize]
     }
 
     /// Vertices of the near clusters with their signed distances, of the last call to [`Self::find`].
@@ -116,9 +124,8 @@ impl Detector {
         placement: &Placement,
         reach: f32,
     ) {
-        let margin = reach + 1.5 * surface.longest_edge;
         let [low, high] = solid.bounds(placement);
-        let is_near = |bounds: &[[f32; 3]; 2]| match solid {
+        let is_near = |bounds: &[[f32; 3]; 2], margin: f32| match solid {
             Solid::HalfSpace { normal } => {
                 let n = placement.rotation * normal;
                 let nearest = V3::from_fn(|k, _| bounds[usize::from(n[k] < 0.0)][k]);
@@ -128,7 +135,7 @@ impl Detector {
         };
         self.near_clusters.clear();
         for (cluster, bounds) in skin.boxes().iter().enumerate() {
-            if is_near(bounds) {
+            if is_near(bounds, reach + STRETCH * surface.longest_edge(cluster)) {
                 self.near_clusters.push(cluster as u32);
             }
         }
@@ -211,7 +218,7 @@ impl Detector {
                 let [v0, v1] = surface.edges[e as usize].map(|v| v as usize);
                 let sum = self.distances[v0] + self.distances[v1];
                 // The distance is 1-Lipschitz: along an edge of length l it is at least (d0 + d1 - l) / 2.
-                if sum - 2.0 * surface.longest_edge >= 2.0 * reach {
+                if sum - STRETCH * surface.edge_lengths[e as usize] >= 2.0 * reach {
                     continue;
                 }
                 let (p, q) = (V3::from(skin.vertex(v0)), V3::from(skin.vertex(v1)));
@@ -243,10 +250,12 @@ impl Detector {
         reach: f32,
     ) {
         for index in 0..self.near_clusters.len() {
-            for &t in surface.triangles_of_cluster(self.near_clusters[index] as usize) {
+            let cluster = self.near_clusters[index] as usize;
+            let margin = reach + STRETCH * surface.longest_edge(cluster);
+            for &t in surface.triangles_of_cluster(cluster) {
                 let vertices = surface.triangles[t as usize];
                 let nearest = vertices.iter().map(|&v| self.distances[v as usize]).fold(f32::INFINITY, f32::min);
-                if nearest - surface.longest_edge >= reach {
+                if nearest >= margin {
                     continue;
                 }
                 let corners = surface.corners(skin, t as usize);

@@ -40,7 +40,11 @@ fn on_axis(
     let tip = tip_distance(solid);
     let mut best: Option<(f32, ContactPoint)> = None;
     for &cluster in detector.near_clusters() {
+        let margin = BAND + surface.longest_edge(cluster as usize);
         for &t in surface.triangles_of_cluster(cluster as usize) {
+            if surface.triangles[t as usize].iter().all(|&v| detector.distance(v) > margin) {
+                continue;
+            }
             let corners = surface.corners(skin, t as usize);
             let Some((distance, weights)) = line_hits(&placement.origin, &direction, &corners) else { continue };
             let error = (distance - tip).abs();

@@ -21,8 +21,10 @@ pub(crate) struct SkinSurface {
     /// Edges and triangles whose first vertex lies in each cluster, as index ranges into the two lists below.
     cluster_edges: Vec<Vec<u32>>,
     cluster_triangles: Vec<Vec<u32>>,
-    /// Longest edge at rest [m].
-    pub(crate) longest_edge: f32,
+    /// Longest edge at rest of each cluster's edges and triangles [m].
+    cluster_longest_edge: Vec<f32>,
+    /// Length of each edge at rest [m].
+    pub(crate) edge_lengths: Vec<f32>,
     /// `tr(J A_0^-1 J^T) / 3` of each vertex [1/kg].
     pub(crate) inverse_mass: Vec<f32>,
 }
@@ -56,8 +58,18 @@ impl SkinSurface {
             vertex_triangle_starts.push(vertex_triangle_starts[vertex_triangle_starts.len() - 1] + list.len() as u32);
         }
         let length = |e: &[u32; 2]| (rest[e[0] as usize] - rest[e[1] as usize]).norm();
+        let edge_lengths: Vec<f32> = edges.iter().map(length).collect();
+        let mut cluster_longest_edge = vec![0.0_f32; n_clusters];
+        for (t, sides) in skin.triangle_edges().iter().enumerate() {
+            let longest = sides.iter().map(|&e| edge_lengths[e as usize]).fold(0.0, f32::max);
+            for v in triangles[t] {
+                let cluster = &mut cluster_longest_edge[v as usize / CLUSTER_SIZE];
+                *cluster = cluster.max(longest);
+            }
+        }
         Self {
-            longest_edge: edges.iter().map(length).fold(0.0, f32::max),
+            cluster_longest_edge,
+            edge_lengths,
             vertex_areas: skin.vertex_areas().iter().map(|&a| a as f32).collect(),
             vertex_triangles: around.concat(),
             rest,
@@ -69,6 +81,11 @@ impl SkinSurface {
             cluster_triangles,
             inverse_mass,
         }
+    }
+
+    /// Longest edge at rest of the triangles at a cluster's vertices [m].
+    pub(crate) fn longest_edge(&self, cluster: usize) -> f32 {
+        self.cluster_longest_edge[cluster]
     }
 
     pub(crate) fn edges_of_cluster(&self, cluster: usize) -> &[u32] {
