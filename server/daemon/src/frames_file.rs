@@ -8,8 +8,8 @@ use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use plica_sim::ToolReading;
-use safetensors::tensor::{Metadata, TensorInfo};
 use safetensors::Dtype;
+use safetensors::tensor::{Metadata, TensorInfo};
 
 use crate::realtime::Frame;
 use crate::wire::position_and_xyzw;
@@ -137,7 +137,8 @@ mod tests {
 
     #[test]
     fn the_crate_reads_back_what_was_streamed() {
-        let path = std::env::temp_dir().join(format!("plicad-frames-{}.safetensors", std::process::id()));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("frames.safetensors");
         let shape = Shape { n_frames: 3, n_skin: 2, n_tools: 0 };
         let mut file = FramesFile::create(&path, shape).unwrap();
         for tick in 1..=3 {
@@ -146,7 +147,6 @@ mod tests {
         }
         file.finish().unwrap();
         let bytes = std::fs::read(&path).unwrap();
-        std::fs::remove_file(&path).unwrap();
         let tensors = SafeTensors::deserialize(&bytes).unwrap();
         let positions = tensors.tensor("positions").unwrap();
         assert_eq!(positions.shape(), [3, 2, 3]);
@@ -157,9 +157,10 @@ mod tests {
 
     #[test]
     fn too_few_frames_are_an_error() {
-        let path = std::env::temp_dir().join(format!("plicad-few-{}.safetensors", std::process::id()));
-        let file = FramesFile::create(&path, Shape { n_frames: 2, n_skin: 1, n_tools: 0 }).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let file =
+            FramesFile::create(&folder.path().join("few.safetensors"), Shape { n_frames: 2, n_skin: 1, n_tools: 0 })
+                .unwrap();
         assert!(file.finish().unwrap_err().to_string().contains("0 frames were written, 2"));
-        std::fs::remove_file(&path).unwrap();
     }
 }

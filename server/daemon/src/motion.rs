@@ -83,7 +83,12 @@ fn pose(tracked: &TrackedPose, sequence: u64) -> Pose {
     }
 }
 
-fn which_tool(file: &Path, config: &Config, tracked: &[TrackedPose], asked: Option<&str>) -> Result<usize, MotionError> {
+fn which_tool(
+    file: &Path,
+    config: &Config,
+    tracked: &[TrackedPose],
+    asked: Option<&str>,
+) -> Result<usize, MotionError> {
     match asked {
         Some(name) => config.tool_index(name).ok_or_else(|| unknown_tool(file, config, name)),
         None if config.tools().len() == 1 || tracked.iter().all(|t| t.tool.is_some()) => Ok(0),
@@ -106,10 +111,7 @@ pub fn room_above(config: &Config, tool: usize) -> Workspace {
     let top = top_height_m(config, 0.5 * x);
     let touch = top + config.tools().get(tool).map_or(0.0, tip_radius_m);
     let depth = DEPTH_M.min(0.3 * top);
-    Workspace {
-        min_m: [0.25 * x, 0.25 * y, touch - depth],
-        max_m: [0.75 * x, 0.75 * y, touch + CLEARANCE_M],
-    }
+    Workspace { min_m: [0.25 * x, 0.25 * y, touch - depth], max_m: [0.75 * x, 0.75 * y, touch + CLEARANCE_M] }
 }
 
 /// Height of the object's top above z = 0 at `x` [m].

@@ -23,7 +23,9 @@ pub enum SceneError {
         source: EmbeddingError,
     },
     /// A support that holds nothing is a mistake.
-    #[error("{file}: objects.{object}.supports.fixed.{what} holds no coarse node; move or enlarge it (the object spans {extents:?} m)")]
+    #[error(
+        "{file}: objects.{object}.supports.fixed.{what} holds no coarse node; move or enlarge it (the object spans {extents:?} m)"
+    )]
     EmptySupport {
         /// The scene.
         file: String,
@@ -109,7 +111,9 @@ fn fixed_nodes(config: &Config, mesh: &HexMesh) -> Result<Vec<bool>, SceneError>
         extents: object.mesh().extents_m(),
     };
     for (i, face) in faces.iter().enumerate() {
-        hold(&mut fixed, mesh, |p| on_face(p, *face, &bounds)).then_some(()).ok_or_else(|| empty(format!("faces[{i}]")))?;
+        hold(&mut fixed, mesh, |p| on_face(p, *face, &bounds))
+            .then_some(())
+            .ok_or_else(|| empty(format!("faces[{i}]")))?;
     }
     for (i, corners) in boxes.iter().enumerate() {
         hold(&mut fixed, mesh, |p| inside(p, corners)).then_some(()).ok_or_else(|| empty(format!("boxes[{i}]")))?;

@@ -136,9 +136,10 @@ pub fn snapshot_reply(outcome: &Outcome) -> SnapshotReply {
 pub fn refusal(refusal: Refusal) -> ErrorReply {
     let (code, message) = match refusal {
         Refusal::NotPaused => (ErrorCode::NotPaused, "step needs a paused simulation; call rpc/pause first"),
-        Refusal::LockStep => {
-            (ErrorCode::RpcMalformed, "this daemon runs in lock-step and moves by rpc/step only; start it without --lock-step")
-        }
+        Refusal::LockStep => (
+            ErrorCode::RpcMalformed,
+            "this daemon runs in lock-step and moves by rpc/step only; start it without --lock-step",
+        ),
         Refusal::UnknownSnapshot => (ErrorCode::UnknownSnapshot, "no snapshot of that id; the last 8 are kept"),
         Refusal::Busy => (ErrorCode::Busy, "steps of an earlier request are still running"),
     };

@@ -104,7 +104,11 @@ fn bad_requests_get_an_error_and_change_nothing() {
         ("step", json!({ "ticks": -1 }), "rpc_malformed"),
         ("step", json!({ "ticks": 10_001 }), "rpc_malformed"),
         ("step", json!({ "ticks": 1, "poses": [good, far] }), "bad_pose"),
-        ("step", json!({ "ticks": 1, "poses": [{ "tool": "drill", "position": [0, 0, 0], "orientation": [0, 0, 0, 1] }] }), "unknown_tool"),
+        (
+            "step",
+            json!({ "ticks": 1, "poses": [{ "tool": "drill", "position": [0, 0, 0], "orientation": [0, 0, 0, 1] }] }),
+            "unknown_tool",
+        ),
         ("restore", json!({ "id": "77" }), "unknown_snapshot"),
         ("restore", json!({ "id": "x" }), "unknown_snapshot"),
         ("resume", json!({}), "rpc_malformed"),
@@ -153,8 +157,17 @@ fn bad_poses_are_counted_by_kind_and_change_nothing() {
     publisher.publish_bytes(b"{\"position\": [0, 0]}".to_vec(), true).unwrap();
     client.publish_pose("drill", &pose(5, 1, 0.2)).unwrap();
     let kinds = [
-        "too_short", "bad_length", "bad_magic", "bad_version", "non_finite", "out_of_range", "not_unit", "repeated",
-        "out_of_order", "conflict", "bad_json",
+        "too_short",
+        "bad_length",
+        "bad_magic",
+        "bad_version",
+        "non_finite",
+        "out_of_range",
+        "not_unit",
+        "repeated",
+        "out_of_order",
+        "conflict",
+        "bad_json",
     ];
     wait_for("all kinds", || {
         let status = client.status().unwrap();

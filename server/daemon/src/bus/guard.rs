@@ -26,7 +26,7 @@ mod tests {
     #[test]
     fn a_panic_is_counted_and_goes_no_further() {
         let counters = Arc::new(SharedCounters::default());
-        let callback = guarded(&counters, |divisor: i32| drop(10 / divisor));
+        let callback = guarded(&counters, |number: i32| assert_ne!(number, 0, "on purpose"));
         callback(0);
         callback(1);
         assert_eq!(counters.copy()["internal"], 1);

@@ -40,7 +40,9 @@ const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
 #[derive(Debug, thiserror::Error)]
 pub enum BusError {
     /// The address is taken.
-    #[error("cannot listen on {endpoint}: the address is in use{owner}; stop that program, or choose another address with --listen")]
+    #[error(
+        "cannot listen on {endpoint}: the address is in use{owner}; stop that program, or choose another address with --listen"
+    )]
     AddressInUse {
         /// What was asked for.
         endpoint: String,

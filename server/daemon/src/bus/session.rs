@@ -45,9 +45,7 @@ pub(super) fn open(options: &BusOptions) -> Result<Session, BusError> {
     if options.listen.is_some() || options.zenoh_config.is_none() {
         refuse_taken_port(&options.place())?;
     }
-    zenoh::open(config)
-        .wait()
-        .map_err(|e| BusError::Zenoh { endpoint: options.place(), problem: e.to_string() })
+    zenoh::open(config).wait().map_err(|e| BusError::Zenoh { endpoint: options.place(), problem: e.to_string() })
 }
 
 fn config(options: &BusOptions) -> Result<Config, BusError> {

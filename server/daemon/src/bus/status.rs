@@ -99,9 +99,8 @@ impl Worker {
         self.sources.readings.update();
         let Sources { readings, statistics, grants, published } = &self.sources;
         let (shared, reading) = (&self.shared, readings.output_buffer());
-        let stage = |(i, s): (usize, &Stage)| {
-            (s.name().to_owned(), wire::distribution(&statistics.stages[i].summary()))
-        };
+        let stage =
+            |(i, s): (usize, &Stage)| (s.name().to_owned(), wire::distribution(&statistics.stages[i].summary()));
         Status {
             versions: versions(),
             session: session_name(shared.keys.root()),
@@ -119,10 +118,7 @@ impl Worker {
             objects: BTreeMap::from([(shared.scene.object.clone(), object(shared, reading, published))]),
             tools: tools(shared, reading),
             rejected: shared.counters.copy(),
-            drops: Drops {
-                wrenches: statistics.wrench_drops.load(Relaxed),
-                frames: published.dropped.load(Relaxed),
-            },
+            drops: Drops { wrenches: statistics.wrench_drops.load(Relaxed), frames: published.dropped.load(Relaxed) },
             jobs: Vec::new(),
         }
     }

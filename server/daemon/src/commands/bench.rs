@@ -71,7 +71,10 @@ pub fn run(args: &BenchArgs, json: bool) -> anyhow::Result<()> {
         });
     }
     let motion = config.bench().ok_or_else(|| {
-        anyhow::anyhow!("{}: has no [bench] table; add one with `motion` keyframes, as configs/scenes/wedge.toml has", config.file().display())
+        anyhow::anyhow!(
+            "{}: has no [bench] table; add one with `motion` keyframes, as configs/scenes/wedge.toml has",
+            config.file().display()
+        )
     })?;
     let report = bench(&config, motion, args.ticks)?;
     print_table(&report);
@@ -226,7 +229,8 @@ pub fn work(model: &Model, iterations: f64, passes: f64) -> (f64, f64) {
 
 fn spread(mut ns: Vec<u64>) -> Spread {
     ns.sort_unstable();
-    let us = |share: f64| ns.get(((ns.len() as f64 - 1.0) * share).round() as usize).map_or(0.0, |ns| *ns as f64 * 1e-3);
+    let us =
+        |share: f64| ns.get(((ns.len() as f64 - 1.0) * share).round() as usize).map_or(0.0, |ns| *ns as f64 * 1e-3);
     Spread { min: us(0.0), p50: us(0.5), p99: us(0.99) }
 }
 
@@ -241,7 +245,11 @@ fn print_table(r: &Report) {
         "limit {:.1} us for a mean tick of {:.1} iterations at {:.1} GB/s and {:.0} GFLOP/s (measured now); median tick / limit = {:.1}",
         r.limit_us, r.mean_iterations, r.read_gb_per_s, r.gflop_per_s, r.roofline_ratio
     );
-    println!("deepest penetration {:.3} mm, {} ticks with a repeated solve", 1e3 * r.max_penetration_m, r.fallback_ticks);
+    println!(
+        "deepest penetration {:.3} mm, {} ticks with a repeated solve",
+        1e3 * r.max_penetration_m,
+        r.fallback_ticks
+    );
     if let Some([x, y, z]) = r.full_press_force_n {
         println!("force at full press: {x:.3} {y:.3} {z:.3} N (Fz = {z:.3} N)");
     }

@@ -88,13 +88,21 @@ fn print(r: &Report) {
     let tools = if r.tools.is_empty() { "none".into() } else { r.tools.join(", ") };
     let solver = if r.block_tridiagonal { "block tridiagonal" } else { "block Jacobi" };
     println!("scene      {} with object `{}`, tools: {tools}", r.scene, r.object);
-    println!("coarse     {} hexahedra, {} nodes, {} of them free; preconditioner: {solver}", r.n_hexes, r.n_nodes, r.n_free_nodes);
-    println!("skin       {} vertices, {} triangles, {} vertices embedded trilinearly", r.n_skin, r.n_triangles, r.embedding_fallbacks);
+    println!(
+        "coarse     {} hexahedra, {} nodes, {} of them free; preconditioner: {solver}",
+        r.n_hexes, r.n_nodes, r.n_free_nodes
+    );
+    println!(
+        "skin       {} vertices, {} triangles, {} vertices embedded trilinearly",
+        r.n_skin, r.n_triangles, r.embedding_fallbacks
+    );
     println!("tables     {:.0} KiB read per tick or more often", r.table_bytes as f64 / 1024.0);
     println!("frame      {} bytes, {:.1} MB/s to each listener", r.frame_bytes, 1e-6 * r.skin_bytes_per_s);
     println!("wrenches   {:.2} MB/s to each listener", 1e-6 * r.wrench_bytes_per_s);
     println!("tick       about {:.0} of {:.0} us ({})", r.estimated_tick_us, r.budget_us, r.estimate);
     if r.estimated_tick_us > 0.8 * r.budget_us {
-        println!("           too slow for this machine: use fewer divisions, fewer substeps, or a longer runtime.timestep_s");
+        println!(
+            "           too slow for this machine: use fewer divisions, fewer substeps, or a longer runtime.timestep_s"
+        );
     }
 }

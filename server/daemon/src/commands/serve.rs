@@ -38,7 +38,10 @@ fn wait(server: &Server, signals: &mut Signals) -> anyhow::Result<()> {
         if signals.pending().next().is_some() {
             return Ok(());
         }
-        anyhow::ensure!(server.is_alive(), "the simulation thread has ended by itself; see the message above, and report it");
+        anyhow::ensure!(
+            server.is_alive(),
+            "the simulation thread has ended by itself; see the message above, and report it"
+        );
         std::thread::sleep(LOOK_AROUND);
     }
 }

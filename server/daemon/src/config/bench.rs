@@ -78,7 +78,11 @@ pub(super) fn check(c: &Check<'_>, raw: &RawBench, tools: &[ToolDescription]) ->
         keyframes.push(Keyframe { tool, time_s, pose: Isometry3::from_parts(Translation3::from(position), rotation) });
     }
     if keyframes.is_empty() {
-        return Err(c.error("bench.motion", "has no keyframe; one or more are needed", "add keyframes or remove [bench]"));
+        return Err(c.error(
+            "bench.motion",
+            "has no keyframe; one or more are needed",
+            "add keyframes or remove [bench]",
+        ));
     }
     let full_press_s = raw.full_press_s.map(|t| c.number("bench.full_press_s", t, 0.0, 3600.0)).transpose()?;
     Ok(BenchConfig { keyframes, full_press_s })

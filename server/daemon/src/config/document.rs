@@ -68,9 +68,8 @@ impl Document {
 
     /// Line of `key`, or of its nearest parent that the file holds.
     fn line_of_key(&self, key: &str) -> Option<usize> {
-        let holds = |e: &&Entry| {
-            key.strip_prefix(e.path.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
-        };
+        let holds =
+            |e: &&Entry| key.strip_prefix(e.path.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
         let nearest = self.entries.iter().filter(holds).max_by_key(|e| e.path.len())?;
         Some(line_of(&self.text, nearest.name.start))
     }

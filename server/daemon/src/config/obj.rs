@@ -28,7 +28,8 @@ fn parse_parts(text: &str, metres_per_unit: f64) -> Result<Vec<Vec<Point3<f64>>>
             _ => {}
         }
     }
-    let hulls: Vec<Vec<_>> = parts.iter().filter(|p| !p.is_empty()).map(|p| p.iter().map(|v| vertices[*v]).collect()).collect();
+    let hulls: Vec<Vec<_>> =
+        parts.iter().filter(|p| !p.is_empty()).map(|p| p.iter().map(|v| vertices[*v]).collect()).collect();
     match hulls.iter().find(|h| h.len() < 4) {
         Some(h) => Err(format!("a part has {} vertices; at least 4 are needed", h.len())),
         None if hulls.is_empty() => Err("there is no face".into()),

@@ -7,12 +7,12 @@ use plica_geometry::EmbeddingKind;
 use plica_geometry::shapes::Wedge;
 use plica_sim::{ElementKind, Material, Plane, Preconditioner, SolverOptions};
 
+use super::ConfigError;
 use super::checks::Check;
 use super::raw::{
     RawCoarse, RawElement, RawEmbedding, RawFace, RawFormat, RawGenerator, RawMaterial, RawMesh, RawObject,
     RawPreconditioner, RawPublish, RawRegion, RawSkin, RawSupports,
 };
-use super::ConfigError;
 
 /// Most hexahedra that the real-time model accepts.
 const MAX_HEXES: u64 = 20_000;

@@ -29,12 +29,7 @@ fn check_tool(c: &Check<'_>, name: &str, raw: &RawTool) -> Result<ToolDescriptio
         coupling: check_coupling(c, &key, raw)?,
         friction: c.number(&key("friction"), raw.friction, 0.0, 2.0)?,
         sampling: check_sampling(c, &key, raw)?,
-        max_tool_speed_m_per_s: c.number(
-            &key("max_tool_speed_m_per_s"),
-            raw.max_tool_speed_m_per_s,
-            0.01,
-            100.0,
-        )?,
+        max_tool_speed_m_per_s: c.number(&key("max_tool_speed_m_per_s"), raw.max_tool_speed_m_per_s, 0.01, 100.0)?,
         stale_after_s: 1e-3 * c.number(&key("stale_after_ms"), raw.stale_after_ms, 1.0, 6e4)?,
         world_from_tracker: c.transform(&key("world_from_tracker"), &raw.world_from_tracker)?,
         tool_from_marker: c.transform(&key("tool_from_marker"), &raw.tool_from_marker)?,

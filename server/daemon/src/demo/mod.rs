@@ -139,7 +139,9 @@ fn write_files(
     let proxy = seen.proxy.unwrap_or_else(Isometry3::identity);
     let subtitle = format!(
         "t = {:.2} s, force on the tool {:.2} N, {} vertices, received over the bus",
-        seen.deepest_sim_time_s, seen.force_then_n, positions.len()
+        seen.deepest_sim_time_s,
+        seen.force_then_n,
+        positions.len()
     );
     let title = format!("{}: tool at its proxy, skin at the deepest press", config.name());
     let shape = &config.tools()[path.tool].shape;

@@ -86,11 +86,7 @@ fn panels(look: &Look<'_>) -> [Panel; 3] {
             camera: Camera::orthographic(section_centre, y, up, along_x, &section),
             cut_y: Some(look.subject.focus.y as f32),
         },
-        Panel {
-            rect: above,
-            camera: Camera::orthographic(centre, -up, y, along_x, &above),
-            cut_y: None,
-        },
+        Panel { rect: above, camera: Camera::orthographic(centre, -up, y, along_x, &above), cut_y: None },
     ]
 }
 
@@ -127,7 +123,8 @@ impl<'a> Look<'a> {
         let displacement: Vec<f32> = subject.positions.iter().zip(&surface.rest).map(distance).collect();
         let largest = displacement.iter().copied().fold(0.0, f32::max);
         let points = surface.rest.iter().map(|p| Point3::from(*p).cast::<f64>());
-        let bounds = points.fold([Point3::from([f64::MAX; 3]), Point3::from([f64::MIN; 3])], |[a, b], p| [a.inf(&p), b.sup(&p)]);
+        let bounds =
+            points.fold([Point3::from([f64::MAX; 3]), Point3::from([f64::MIN; 3])], |[a, b], p| [a.inf(&p), b.sup(&p)]);
         Self {
             subject,
             normals,

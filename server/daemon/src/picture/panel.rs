@@ -4,12 +4,12 @@ use std::collections::HashMap;
 
 use nalgebra::{Point3, Vector3};
 
+use super::Look;
 use super::camera::Camera;
 use super::canvas::{Canvas, Rect};
 use super::colour::{self, Linear};
 use super::raster::{Corner, Fragment, line, triangle};
 use super::tool_mesh::{ToolMesh, tessellate};
-use super::Look;
 use crate::surface::Surface;
 
 /// Distance of the lines drawn on the skin, along its rest shape [m].

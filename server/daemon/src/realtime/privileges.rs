@@ -94,7 +94,10 @@ mod os {
         // SAFETY: PR_SET_TIMERSLACK takes one integer.
         match unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, 1, 0, 0, 0) } {
             0 => Ok(1),
-            _ => Err(format!("timer slack stays at 50 us ({}): ticks start that much later", std::io::Error::last_os_error())),
+            _ => Err(format!(
+                "timer slack stays at 50 us ({}): ticks start that much later",
+                std::io::Error::last_os_error()
+            )),
         }
     }
 }

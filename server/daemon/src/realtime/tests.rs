@@ -145,7 +145,7 @@ fn snapshot_and_restore_repeat_the_same_bytes() {
     let press = |sequence, z| vec![ToolPose { tool: 0, sample: sample(sequence, z) }];
     order(&mut core, &mut ports, Command::Step { ticks: 20, poses: press(1, 0.024) }).unwrap();
     let id = order(&mut core, &mut ports, Command::Snapshot).unwrap().snapshot.unwrap();
-    let mut run = |core: &mut Loop, ports: &mut Ports| {
+    let run = |core: &mut Loop, ports: &mut Ports| {
         order(core, ports, Command::Step { ticks: 30, poses: press(2, 0.023) }).unwrap();
         positions(core, ports)
     };

@@ -65,7 +65,8 @@ pub fn spawn(core: Loop, options: ThreadOptions) -> std::io::Result<Running> {
         }
         core
     })?;
-    let grants = started.recv().map_err(|_| std::io::Error::other("the simulation thread ended while it was set up"))?;
+    let grants =
+        started.recv().map_err(|_| std::io::Error::other("the simulation thread ended while it was set up"))?;
     Ok(Running { stop, waker, grants, thread: Some(thread) })
 }
 
@@ -180,8 +181,7 @@ fn sleep(duration: Duration) {
     use rustix::thread::{ClockId, Timespec, clock_nanosleep_absolute};
     let now = rustix::time::clock_gettime(ClockId::Monotonic);
     let until_ns = i128::from(now.tv_sec) * 1_000_000_000 + i128::from(now.tv_nsec) + duration.as_nanos() as i128;
-    let until =
-        Timespec { tv_sec: (until_ns / 1_000_000_000) as i64, tv_nsec: (until_ns % 1_000_000_000) as _ };
+    let until = Timespec { tv_sec: (until_ns / 1_000_000_000) as i64, tv_nsec: (until_ns % 1_000_000_000) as _ };
     // An interrupted sleep is taken up again by the loop, which looks at the clock first.
     let _ = clock_nanosleep_absolute(ClockId::Monotonic, &until);
 }

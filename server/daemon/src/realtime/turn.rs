@@ -9,7 +9,8 @@ use triple_buffer::triple_buffer;
 use super::outbox::{Cadences, Outbox, ToolOutlet};
 use super::snapshots::Snapshots;
 use super::{
-    Command, CommandPort, Frame, FramePort, Outcome, Ports, Reading, Refusal, Reply, Statistics, TurnProbe, Waker, WrenchPort,
+    Command, CommandPort, Frame, FramePort, Outcome, Ports, Reading, Refusal, Reply, Statistics, TurnProbe, Waker,
+    WrenchPort,
 };
 
 /// Poses per tool that may wait for a tick.
