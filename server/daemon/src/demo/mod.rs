@@ -137,13 +137,9 @@ fn write_files(
     let (picture, glb) = (out.join("demo.png"), out.join("demo.glb"));
     let positions = if seen.deepest.is_empty() { &surface.rest } else { &seen.deepest };
     let proxy = seen.proxy.unwrap_or_else(Isometry3::identity);
-    let subtitle = format!(
-        "t = {:.2} s, force on the tool {:.2} N, {} vertices, received over the bus",
-        seen.deepest_sim_time_s,
-        seen.force_then_n,
-        positions.len()
-    );
-    let title = format!("{}: tool at its proxy, skin at the deepest press", config.name());
+    let (time_s, force_n) = (seen.deepest_sim_time_s, seen.force_then_n);
+    let subtitle = format!("t = {time_s:.2} s, force {force_n:.2} N");
+    let title = format!("{}: deepest press", config.name());
     let shape = &config.tools()[path.tool].shape;
     let subject = Subject {
         title: &title,

@@ -4,6 +4,7 @@
 mod camera;
 mod canvas;
 mod colour;
+mod creased;
 mod font;
 mod panel;
 mod raster;
@@ -13,7 +14,7 @@ use image::RgbImage;
 use nalgebra::{Isometry3, Point3, Vector3};
 use plica_sim::ToolShape;
 
-use crate::surface::{Surface, normals_into};
+use crate::surface::Surface;
 use camera::Camera;
 use canvas::{Canvas, Rect};
 use panel::{Panel, draw_panel};
@@ -45,7 +46,8 @@ pub struct Subject<'a> {
 /// Everything about the skin that the views share.
 struct Look<'a> {
     subject: &'a Subject<'a>,
-    normals: Vec<[f32; 3]>,
+    /// Normals of each triangle's corners, not smoothed over the edges of the outline.
+    normals: Vec<[[f32; 3]; 3]>,
     /// Length of each vertex's displacement [m].
     displacement: Vec<f32>,
     /// Where the colour scale ends [m].
@@ -75,7 +77,7 @@ fn panels(look: &Look<'_>) -> [Panel; 3] {
     let rect = |x, y, w, h| Rect { x, y, w, h }.times(OVERSAMPLING);
     let (main, section, above) = (rect(0, 0, 1060, 900), rect(1080, 90, 500, 360), rect(1080, 520, 500, 350));
     let eye = centre + size * Vector3::new(-0.62, -1.45, 1.12);
-    let target = centre + Vector3::new(0.0, 0.0, 0.06 * size);
+    let target = centre + Vector3::new(0.02 * size, 0.0, 0.03 * size);
     let along_x = (max.x - min.x) * 1.12;
     let (y, up) = (Vector3::y(), Vector3::z());
     let section_centre = Point3::new(centre.x, look.subject.focus.y, centre.z + 0.18 * (max.x - min.x));
@@ -117,8 +119,6 @@ fn legend(picture: &mut Canvas, end_m: f32) {
 impl<'a> Look<'a> {
     fn new(subject: &'a Subject<'a>) -> Self {
         let surface = subject.surface;
-        let mut normals = vec![[0.0; 3]; surface.rest.len()];
-        normals_into(&surface.triangles, subject.positions, &mut normals);
         let distance = |(p, r): (&[f32; 3], &[f32; 3])| (0..3).map(|i| (p[i] - r[i]).powi(2)).sum::<f32>().sqrt();
         let displacement: Vec<f32> = subject.positions.iter().zip(&surface.rest).map(distance).collect();
         let largest = displacement.iter().copied().fold(0.0, f32::max);
@@ -127,10 +127,10 @@ impl<'a> Look<'a> {
             points.fold([Point3::from([f64::MAX; 3]), Point3::from([f64::MIN; 3])], |[a, b], p| [a.inf(&p), b.sup(&p)]);
         Self {
             subject,
-            normals,
+            normals: creased::corner_normals(surface, subject.positions),
             displacement,
             scale_end_m: round_up(largest.max(1e-4)),
-            outline: panel::sharp_edges(surface),
+            outline: creased::sharp_edges(surface),
             bounds,
         }
     }

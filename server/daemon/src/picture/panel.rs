@@ -10,7 +10,6 @@ use super::canvas::{Canvas, Rect};
 use super::colour::{self, Linear};
 use super::raster::{Corner, Fragment, line, triangle};
 use super::tool_mesh::{ToolMesh, tessellate};
-use crate::surface::Surface;
 
 /// Distance of the lines drawn on the skin, along its rest shape [m].
 const GRID_M: f32 = 0.01;
@@ -18,8 +17,6 @@ const GRID_M: f32 = 0.01;
 const GRID_LINE_M: f32 = 1.7e-4;
 /// How much of what is behind a tool it hides.
 const TOOL_OPACITY: f32 = 0.72;
-/// Edges whose triangles turn by more than this belong to the outline [cosine].
-const SHARP: f64 = 0.8;
 
 /// A view and where it goes.
 #[derive(Debug, Clone)]
@@ -40,14 +37,14 @@ pub(super) fn draw_panel(canvas: &mut Canvas, look: &Look<'_>, panel: &Panel) {
 
 fn draw_skin(canvas: &mut Canvas, look: &Look<'_>, panel: &Panel) {
     let Look { subject, normals, displacement, scale_end_m, .. } = look;
-    let corner = |v: u32| {
-        let v = v as usize;
-        let (p, n, r) = (subject.positions[v], normals[v], subject.surface.rest[v]);
-        let attributes = [p[0], p[1], p[2], n[0], n[1], n[2], r[0], r[1], r[2], displacement[v] / scale_end_m];
-        Corner { position: point(p), attributes }
-    };
-    for t in &subject.surface.triangles {
-        triangle(canvas, &panel.rect, &panel.camera, t.map(corner), |canvas, f| {
+    for (t, corner_normals) in subject.surface.triangles.iter().zip(normals) {
+        let corner = |k: usize| {
+            let v = t[k] as usize;
+            let (p, n, r) = (subject.positions[v], corner_normals[k], subject.surface.rest[v]);
+            let attributes = [p[0], p[1], p[2], n[0], n[1], n[2], r[0], r[1], r[2], displacement[v] / scale_end_m];
+            Corner { position: point(p), attributes }
+        };
+        triangle(canvas, &panel.rect, &panel.camera, [0, 1, 2].map(corner), |canvas, f| {
             let cut = panel.cut_y.is_some_and(|y| f.attributes[1] < y);
             if !cut && f.depth < canvas.depths[f.pixel] {
                 canvas.depths[f.pixel] = f.depth;
@@ -65,7 +62,7 @@ fn skin_colour(camera: &Camera, f: &Fragment<10>) -> Linear {
         return colour::CUT;
     }
     let base = colour::scale(share);
-    let on_line = on_grid(rx, nx) || on_grid(ry, ny) || on_grid(rz, nz);
+    let on_line = on_grid(rx, nx) || on_grid(ry, ny) || (rz > 0.1 * GRID_M && on_grid(rz, nz));
     let base = if on_line { colour::times(base, 0.62) } else { base };
     lit(camera, &point([px, py, pz]), &normal, base, 0.10, 24.0)
 }
@@ -82,7 +79,7 @@ fn lit(camera: &Camera, p: &Point3<f64>, normal: &Vector3<f64>, base: Linear, gl
     let diffuse = normal.dot(&light).max(0.0);
     let half = (light + viewer).normalize();
     let shine = gloss * normal.dot(&half).max(0.0).powf(sharpness) as f32;
-    let brightness = (0.26 + 0.16 * sky + 0.66 * diffuse) as f32;
+    let brightness = (0.33 + 0.20 * sky + 0.62 * diffuse) as f32;
     colour::mix(colour::times(base, brightness), [1.0; 3], shine)
 }
 
@@ -121,26 +118,6 @@ fn draw_tool(canvas: &mut Canvas, panel: &Panel, tool: &ToolMesh) {
     for (pixel, (_, steel)) in layer {
         canvas.colours[pixel] = colour::mix(canvas.colours[pixel], steel, TOOL_OPACITY);
     }
-}
-
-/// Edges where two triangles of the rest shape turn sharply.
-pub(super) fn sharp_edges(surface: &Surface) -> Vec<[Point3<f64>; 2]> {
-    let mut sides: HashMap<(u32, u32), Vector3<f64>> = HashMap::new();
-    let mut sharp = Vec::new();
-    for t in &surface.triangles {
-        let [a, b, c] = t.map(|v| point(surface.rest[v as usize]));
-        let normal = (b - a).cross(&(c - a)).normalize();
-        for (v, w) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
-            let key = (v.min(w), v.max(w));
-            match sides.insert(key, normal) {
-                Some(other) if other.dot(&normal) < SHARP => {
-                    sharp.push([v, w].map(|v| point(surface.rest[v as usize])));
-                }
-                _ => {}
-            }
-        }
-    }
-    sharp
 }
 
 fn point(p: [f32; 3]) -> Point3<f64> {
