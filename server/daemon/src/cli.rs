@@ -45,7 +45,7 @@ pub struct BusArgs {
     /// Zenoh endpoint to listen on.
     #[arg(long, value_name = "ENDPOINT", help = format!("Zenoh endpoint to listen on [default: {DEFAULT_ENDPOINT}]"))]
     pub listen: Option<String>,
-    /// Session name in every key: plica/v1/<SESSION>/...
+    /// Session name in every key: `plica/v1/SESSION/...`
     #[arg(long, default_value = DEFAULT_SESSION)]
     pub session: String,
     /// Zenoh configuration (JSON5) in place of the built-in one, for TLS, access control, routers: see configs/zenoh.
@@ -102,7 +102,7 @@ pub struct SimulateArgs {
 /// `plicad bench`.
 #[derive(Debug, Args)]
 pub struct BenchArgs {
-    /// Scene file with a [bench] table, or `wedge` for the built-in one.
+    /// Scene file with a \[bench\] table, or `wedge` for the built-in one.
     pub scene: PathBuf,
     /// Ticks to time; the scene's motion is repeated.
     #[arg(long, default_value_t = 3000, value_parser = clap::value_parser!(u64).range(100..=10_000_000))]

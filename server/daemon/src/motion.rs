@@ -8,9 +8,9 @@ use plica_sim::{ToolDescription, ToolShape};
 
 use crate::config::{Config, MeshConfig};
 
-/// How far a fitted motion goes below the place of first touch [m], at most.
+/// How far a fitted motion goes below the place of first touch \[m\], at most.
 const DEPTH_M: f64 = 0.008;
-/// How far it goes above that [m].
+/// How far it goes above that \[m\].
 const CLEARANCE_M: f64 = 0.03;
 
 /// Why poses cannot be used.
@@ -42,7 +42,7 @@ pub enum MotionError {
 /// A pose and when it arrives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimedPose {
-    /// Time [s].
+    /// Time \[s\].
     pub time_s: f64,
     /// Index of the tool.
     pub tool: usize,
@@ -105,7 +105,7 @@ fn known(config: &Config) -> String {
     if names.is_empty() { "no tools".into() } else { names.join(", ") }
 }
 
-/// The middle half of the object, from a press of [`DEPTH_M`] to [`CLEARANCE_M`] above the surface.
+/// The middle half of the object, from a press of `DEPTH_M` to `CLEARANCE_M` above the surface.
 pub fn room_above(config: &Config, tool: usize) -> Workspace {
     let [x, y, _] = config.object().mesh().extents_m();
     let top = top_height_m(config, 0.5 * x);
@@ -114,7 +114,7 @@ pub fn room_above(config: &Config, tool: usize) -> Workspace {
     Workspace { min_m: [0.25 * x, 0.25 * y, touch - depth], max_m: [0.75 * x, 0.75 * y, touch + CLEARANCE_M] }
 }
 
-/// Height of the object's top above z = 0 at `x` [m].
+/// Height of the object's top above z = 0 at `x` \[m\].
 pub fn top_height_m(config: &Config, x: f64) -> f64 {
     match config.object().mesh() {
         MeshConfig::Wedge(wedge) => wedge.height_m(x),
@@ -122,7 +122,7 @@ pub fn top_height_m(config: &Config, x: f64) -> f64 {
     }
 }
 
-/// How far a tool reaches below its origin [m].
+/// How far a tool reaches below its origin \[m\].
 pub fn tip_radius_m(tool: &ToolDescription) -> f64 {
     let lowest = |points: &mut dyn Iterator<Item = f64>| points.fold(0.0_f64, |low, z| low.max(-z));
     match &tool.shape {

@@ -21,7 +21,7 @@ impl Roofline {
         Self { bytes_per_s: read_bandwidth(table_bytes), flops_per_s: fma_rate() }
     }
 
-    /// The least time in which something that reads `bytes` and computes `flops` can be done [s].
+    /// The least time in which something that reads `bytes` and computes `flops` can be done \[s\].
     pub fn limit_s(&self, bytes: f64, flops: f64) -> f64 {
         (bytes / self.bytes_per_s).max(flops / self.flops_per_s)
     }

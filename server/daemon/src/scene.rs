@@ -33,7 +33,7 @@ pub enum SceneError {
         object: String,
         /// Which face or box.
         what: String,
-        /// Extents of the object [m].
+        /// Extents of the object \[m\].
         extents: [f64; 3],
     },
     /// The model cannot be built.

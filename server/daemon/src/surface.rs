@@ -5,7 +5,7 @@ use plica_geometry::Skin;
 /// A skin as it is published.
 #[derive(Debug, Clone)]
 pub struct Surface {
-    /// Rest positions `[n_skin]` [m].
+    /// Rest positions `[n_skin]` \[m\].
     pub rest: Vec<[f32; 3]>,
     /// Vertices of each triangle, counter-clockwise from outside.
     pub triangles: Vec<[u32; 3]>,

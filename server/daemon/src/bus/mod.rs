@@ -82,7 +82,7 @@ pub struct Scene {
     pub object: String,
     /// Names of the tools, in the model's order.
     pub tools: Vec<String>,
-    /// When each tool is stale [s].
+    /// When each tool is stale \[s\].
     pub stale_after_s: Vec<f64>,
     /// Rates and format.
     pub publish: PublishConfig,

@@ -44,9 +44,9 @@ pub struct Report {
     pub mean_iterations: f64,
     /// Ticks that repeated a solve.
     pub fallback_ticks: u64,
-    /// Deepest penetration [m].
+    /// Deepest penetration \[m\].
     pub max_penetration_m: f64,
-    /// Force on the first tool at full press [N], in the first pass of the motion.
+    /// Force on the first tool at full press \[N\], in the first pass of the motion.
     pub full_press_force_n: Option<[f64; 3]>,
 }
 

@@ -19,7 +19,7 @@ pub struct BenchConfig {
 pub struct Keyframe {
     /// Index of the tool.
     pub tool: usize,
-    /// Time [s].
+    /// Time \[s\].
     pub time_s: f64,
     /// Pose of the tool in the world.
     pub pose: Isometry3<f64>,
@@ -31,12 +31,12 @@ impl BenchConfig {
         &self.keyframes
     }
 
-    /// When the tool's force is reported as the force at full press [s].
+    /// When the tool's force is reported as the force at full press \[s\].
     pub fn full_press_s(&self) -> Option<f64> {
         self.full_press_s
     }
 
-    /// Time of the last keyframe [s].
+    /// Time of the last keyframe \[s\].
     pub fn duration_s(&self) -> f64 {
         self.keyframes.last().map_or(0.0, |k| k.time_s)
     }

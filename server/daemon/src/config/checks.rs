@@ -7,7 +7,7 @@ use super::{ConfigError, Document};
 
 /// How far the length of a typed quaternion may be from 1.
 const UNIT_TOLERANCE: f64 = 1e-2;
-/// Largest coordinate of anything in a scene [m].
+/// Largest coordinate of anything in a scene \[m\].
 const LARGEST_M: f64 = 1e3;
 
 /// Checks values against a document's lines.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use nalgebra::Point3;
 
-/// Points of each part [m]. Faces decide which part a vertex belongs to; the error is a sentence.
+/// Points of each part \[m\]. Faces decide which part a vertex belongs to; the error is a sentence.
 pub(super) fn read_parts(path: &Path, metres_per_unit: f64) -> Result<Vec<Vec<Point3<f64>>>, String> {
     let text = std::fs::read_to_string(path).map_err(|e| format!("{} cannot be read: {e}", path.display()))?;
     parse_parts(&text, metres_per_unit).map_err(|e| format!("{}: {e}", path.display()))

@@ -42,7 +42,7 @@ pub struct ObjectConfig {
 pub enum MeshConfig {
     /// Height falls linearly along x.
     Wedge(Wedge),
-    /// A box of these extents [m].
+    /// A box of these extents \[m\].
     Block([f64; 3]),
 }
 
@@ -51,7 +51,7 @@ pub enum MeshConfig {
 pub struct Region {
     /// Name, for messages.
     pub name: String,
-    /// Lower and upper corner [m].
+    /// Lower and upper corner \[m\].
     pub corners: [Point3<f64>; 2],
     /// Material of hexahedra whose centre lies inside.
     pub material: Material,
@@ -62,7 +62,7 @@ pub struct Region {
 pub struct FixedConfig {
     /// Faces of the mesh's bounding box.
     pub faces: Vec<Face>,
-    /// Lower and upper corners of boxes [m].
+    /// Lower and upper corners of boxes \[m\].
     pub boxes: Vec<[Point3<f64>; 2]>,
 }
 
@@ -78,7 +78,7 @@ pub struct Face {
 /// Published surface.
 #[derive(Debug, Clone, Copy)]
 pub struct SkinConfig {
-    /// Largest edge of the skin grid [m].
+    /// Largest edge of the skin grid \[m\].
     pub spacing_m: f64,
     /// Interpolation from coarse nodes to skin vertices.
     pub embedding: EmbeddingKind,
@@ -346,7 +346,7 @@ fn check_publish(c: &Check<'_>, key: &str, raw: &RawPublish) -> Result<PublishCo
 }
 
 impl MeshConfig {
-    /// Extents of the bounding box, which starts at the origin [m].
+    /// Extents of the bounding box, which starts at the origin \[m\].
     pub fn extents_m(&self) -> [f64; 3] {
         match self {
             Self::Wedge(w) => [w.length_m, w.width_m, w.thick_height_m.max(w.thin_height_m)],

@@ -1,5 +1,7 @@
 //! A scene file as typed: every key of the TOML, nothing checked beyond its type. `plicad schema` prints this.
 
+#![allow(rustdoc::broken_intra_doc_links, reason = "units in brackets; the schema shows this text as it is")]
+
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;

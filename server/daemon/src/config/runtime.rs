@@ -19,11 +19,11 @@ pub struct RuntimeConfig {
 }
 
 impl RuntimeConfig {
-    /// Length of a tick [s].
+    /// Length of a tick \[s\].
     pub fn timestep_s(&self) -> f64 {
         self.timestep_s
     }
-    /// Acceleration of free fall, along -z [m/s2].
+    /// Acceleration of free fall, along -z \[m/s2\].
     pub fn gravity_m_per_s2(&self) -> Vector3<f64> {
         self.gravity_m_per_s2
     }

@@ -33,9 +33,9 @@ const POSE_HZ: f64 = 250.0;
 pub struct Summary {
     /// Ticks while the demo ran.
     pub ticks: u64,
-    /// Duration of a tick [us].
+    /// Duration of a tick \[us\].
     pub tick_us: Percentiles,
-    /// How late the simulation thread woke up [us].
+    /// How late the simulation thread woke up \[us\].
     pub lateness_us: Percentiles,
     /// Ticks that ended after the next one was due.
     pub overruns: u64,
@@ -53,13 +53,13 @@ pub struct Summary {
     pub frames_missed: u64,
     /// Wrenches that it received.
     pub wrenches_received: u64,
-    /// Median time from a pose leaving the client to the first wrench that answers it [us].
+    /// Median time from a pose leaving the client to the first wrench that answers it \[us\].
     pub motion_to_force_us: f64,
-    /// Deepest penetration of skin and tool [m].
+    /// Deepest penetration of skin and tool \[m\].
     pub max_penetration_m: f64,
-    /// Largest force on the tool [N].
+    /// Largest force on the tool \[N\].
     pub peak_force_n: f64,
-    /// Largest displacement of the skin [m].
+    /// Largest displacement of the skin \[m\].
     pub peak_displacement_m: f64,
     /// Picture of the deformed skin.
     pub picture: PathBuf,

@@ -3,11 +3,11 @@
 use crate::config::Config;
 use crate::motion::{MotionError, TimedPose, tip_radius_m, top_height_m};
 
-/// How deep the device goes below first touch [m]; the spring of the coupling takes part of it.
+/// How deep the device goes below first touch \[m\]; the spring of the coupling takes part of it.
 const DEPTH_M: f64 = 0.012;
-/// How far it slides [m].
+/// How far it slides \[m\].
 const SLIDE_M: f64 = 0.024;
-/// Height above first touch where it starts and ends [m].
+/// Height above first touch where it starts and ends \[m\].
 const CLEARANCE_M: f64 = 0.012;
 
 /// A position and a quaternion `xyzw`.
@@ -54,7 +54,7 @@ pub fn from_file(file: &std::path::Path, config: &Config, fit: bool) -> Result<P
 }
 
 impl Path {
-    /// Time of the last pose [s].
+    /// Time of the last pose \[s\].
     pub fn duration_s(&self) -> f64 {
         self.keys.last().map_or(0.0, |(t, _)| *t)
     }

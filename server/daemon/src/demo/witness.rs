@@ -23,7 +23,7 @@ pub(super) struct Seen {
     pub(super) wrenches: u64,
     pub(super) peak_force_n: f64,
     pub(super) peak_displacement_m: f32,
-    /// Positions at the deepest press [m].
+    /// Positions at the deepest press \[m\].
     pub(super) deepest: Vec<[f32; 3]>,
     pub(super) deepest_sim_time_s: f64,
     deepest_tick: u64,
@@ -32,7 +32,7 @@ pub(super) struct Seen {
     /// Proxies and forces by tick, newest last.
     recent: Vec<(u64, Isometry3<f64>, f64)>,
     answers: Vec<WrenchMessage>,
-    /// Median from a pose leaving to the first wrench that answers it [us].
+    /// Median from a pose leaving to the first wrench that answers it \[us\].
     motion_to_force_us: f64,
 }
 

@@ -22,7 +22,7 @@ pub(super) struct Camera {
 pub(super) struct Projected {
     pub(super) x: f64,
     pub(super) y: f64,
-    /// Distance along the view [m].
+    /// Distance along the view \[m\].
     pub(super) depth: f64,
     /// What attributes are weighted by before they are interpolated over pixels.
     pub(super) weight: f64,

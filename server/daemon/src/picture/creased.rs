@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::surface::Surface;
 
-/// Triangles that turn by more than this are parted by an edge [cosine].
+/// Triangles that turn by more than this are parted by an edge \[cosine\].
 const SHARP: f64 = 0.8;
 
 /// Edges of the rest shape that are sharp.

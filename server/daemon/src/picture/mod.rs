@@ -19,9 +19,9 @@ use camera::Camera;
 use canvas::{Canvas, Rect};
 use panel::{Panel, draw_panel};
 
-/// Width of the picture [pixels].
+/// Width of the picture \[pixels\].
 pub const WIDTH: u32 = 1600;
-/// Height of the picture [pixels].
+/// Height of the picture \[pixels\].
 pub const HEIGHT: u32 = 900;
 /// Samples per pixel along each axis.
 const OVERSAMPLING: u32 = 2;
@@ -35,11 +35,11 @@ pub struct Subject<'a> {
     pub subtitle: &'a str,
     /// Rest shape.
     pub surface: &'a Surface,
-    /// Deformed world positions `[n_skin]` [m].
+    /// Deformed world positions `[n_skin]` \[m\].
     pub positions: &'a [[f32; 3]],
     /// Tools and where their proxies are.
     pub tools: Vec<(&'a ToolShape, Isometry3<f64>)>,
-    /// What the views turn towards [m].
+    /// What the views turn towards \[m\].
     pub focus: Point3<f64>,
 }
 
@@ -48,13 +48,13 @@ struct Look<'a> {
     subject: &'a Subject<'a>,
     /// Normals of each triangle's corners, not smoothed over the edges of the outline.
     normals: Vec<[[f32; 3]; 3]>,
-    /// Length of each vertex's displacement [m].
+    /// Length of each vertex's displacement \[m\].
     displacement: Vec<f32>,
-    /// Where the colour scale ends [m].
+    /// Where the colour scale ends \[m\].
     scale_end_m: f32,
     /// Edges of the rest shape where it turns sharply.
     outline: Vec<[Point3<f64>; 2]>,
-    /// Corners of the rest shape's bounding box [m].
+    /// Corners of the rest shape's bounding box \[m\].
     bounds: [Point3<f64>; 2],
 }
 
@@ -77,12 +77,12 @@ fn panels(look: &Look<'_>) -> [Panel; 3] {
     let rect = |x, y, w, h| Rect { x, y, w, h }.times(OVERSAMPLING);
     let (main, section, above) = (rect(0, 0, 1060, 900), rect(1080, 90, 500, 360), rect(1080, 520, 500, 350));
     let eye = centre + size * Vector3::new(-0.62, -1.45, 1.12);
-    let target = centre + Vector3::new(0.02 * size, 0.0, 0.03 * size);
+    let target = centre + Vector3::new(0.02 * size, 0.0, 0.01 * size);
     let along_x = (max.x - min.x) * 1.12;
     let (y, up) = (Vector3::y(), Vector3::z());
     let section_centre = Point3::new(centre.x, look.subject.focus.y, centre.z + 0.18 * (max.x - min.x));
     [
-        Panel { rect: main, camera: Camera::perspective(eye, target, 0.50, &main), cut_y: None },
+        Panel { rect: main, camera: Camera::perspective(eye, target, 0.53, &main), cut_y: None },
         Panel {
             rect: section,
             camera: Camera::orthographic(section_centre, y, up, along_x, &section),

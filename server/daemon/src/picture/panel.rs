@@ -11,9 +11,9 @@ use super::colour::{self, Linear};
 use super::raster::{Corner, Fragment, line, triangle};
 use super::tool_mesh::{ToolMesh, tessellate};
 
-/// Distance of the lines drawn on the skin, along its rest shape [m].
+/// Distance of the lines drawn on the skin, along its rest shape \[m\].
 const GRID_M: f32 = 0.01;
-/// Half the width of a grid line [m].
+/// Half the width of a grid line \[m\].
 const GRID_LINE_M: f32 = 1.7e-4;
 /// How much of what is behind a tool it hides.
 const TOOL_OPACITY: f32 = 0.72;
@@ -23,7 +23,7 @@ const TOOL_OPACITY: f32 = 0.72;
 pub(super) struct Panel {
     pub(super) rect: Rect,
     pub(super) camera: Camera,
-    /// Everything in front of this y is cut away [m].
+    /// Everything in front of this y is cut away \[m\].
     pub(super) cut_y: Option<f32>,
 }
 

@@ -32,7 +32,7 @@ pub enum Command {
 pub struct Outcome {
     /// Ticks since reset.
     pub tick: u64,
-    /// Simulated time [s].
+    /// Simulated time \[s\].
     pub sim_time_s: f64,
     /// Whether it stands still.
     pub paused: bool,

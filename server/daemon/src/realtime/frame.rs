@@ -7,15 +7,15 @@ use plica_sim::{TickReport, ToolReading};
 pub struct Frame {
     /// Ticks since reset.
     pub tick: u64,
-    /// Simulated time [s].
+    /// Simulated time \[s\].
     pub sim_time_s: f64,
-    /// Source time of the newest pose of any tool [ns].
+    /// Source time of the newest pose of any tool \[ns\].
     pub newest_pose_source_time_ns: u64,
     /// Whether a state was rolled back since the frame before.
     pub degraded: bool,
     /// Whether the object is at rest and this is a repeat.
     pub sleeping: bool,
-    /// World positions `[n_skin]` [m].
+    /// World positions `[n_skin]` \[m\].
     pub positions: Vec<[f32; 3]>,
     /// Counts frames that are due for publishing; a frame made for a question alone keeps the number.
     pub due: u64,
@@ -28,7 +28,7 @@ pub struct Frame {
 pub struct ToolFrame {
     /// Ticks since reset.
     pub tick: u64,
-    /// Simulated time [s].
+    /// Simulated time \[s\].
     pub sim_time_s: f64,
     /// The tool.
     pub reading: ToolReading,
@@ -39,7 +39,7 @@ pub struct ToolFrame {
 pub struct Reading {
     /// Ticks since reset.
     pub tick: u64,
-    /// Simulated time [s].
+    /// Simulated time \[s\].
     pub sim_time_s: f64,
     /// Whether it stands still.
     pub paused: bool,
@@ -47,7 +47,7 @@ pub struct Reading {
     pub rollbacks: u64,
     /// The last tick.
     pub report: TickReport,
-    /// Deepest penetration since reset [m].
+    /// Deepest penetration since reset \[m\].
     pub max_penetration_m: f32,
     /// Ticks since reset that repeated a solve with block Jacobi.
     pub fallbacks: u64,

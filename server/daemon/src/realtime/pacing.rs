@@ -17,12 +17,12 @@ pub struct Pacer {
 pub enum Plan {
     /// Nothing is due before this time.
     Wait {
-        /// The next deadline [ns].
+        /// The next deadline \[ns\].
         until_ns: u64,
     },
     /// A tick is due.
     Run {
-        /// How long ago it was due [ns].
+        /// How long ago it was due \[ns\].
         lateness_ns: u64,
     },
 }

@@ -9,7 +9,7 @@ pub struct Grants {
     pub fifo: bool,
     /// Whether memory is locked.
     pub memory_locked: bool,
-    /// Timer slack [ns]; 0 if unknown.
+    /// Timer slack \[ns\]; 0 if unknown.
     pub timer_slack_ns: u64,
     /// What was refused.
     pub warnings: Vec<String>,

@@ -28,7 +28,7 @@ impl StageTimer {
         Self { current: None, since: Instant::now(), sums_ns: [0; Stage::ALL.len()] }
     }
 
-    /// The time of each stage since the last call [ns].
+    /// The time of each stage since the last call \[ns\].
     pub fn take_ns(&mut self) -> [u64; Stage::ALL.len()] {
         std::mem::take(&mut self.sums_ns)
     }
