@@ -59,7 +59,7 @@ pub fn read(
 ) -> Result<(Vec<TimedPose>, Option<Fit>), MotionError> {
     let mut tracked = trajectory::read(file)?;
     let default_tool = which_tool(file, config, &tracked, default_tool)?;
-    let fitted = fit.then(|| trajectory::fit(&mut tracked, room_above(config, default_tool))).transpose()?;
+    let fitted = if fit { Some(fit_above(config, default_tool, &mut tracked)?) } else { None };
     let mut sequences = vec![0; config.tools().len()];
     let mut poses = Vec::with_capacity(tracked.len());
     for t in &tracked {
@@ -105,6 +105,26 @@ fn known(config: &Config) -> String {
     if names.is_empty() { "no tools".into() } else { names.join(", ") }
 }
 
+/// Maps a motion into [`room_above`], and then down until its deepest pose presses as far as the room goes.
+///
+/// One scale keeps the motion's shape, so a motion that is wide and flat would hover in the middle of the room.
+fn fit_above(config: &Config, tool: usize, tracked: &mut [TrackedPose]) -> Result<Fit, TrajectoryError> {
+    let mut fit = trajectory::fit(tracked, room_above(config, tool))?;
+    let radius = config.tools().get(tool).map_or(0.0, tip_radius_m);
+    let height = |p: &TrackedPose| p.position_m[2] - radius - top_height_m(config, p.position_m[0]);
+    let lowest = tracked.iter().map(height).fold(f64::INFINITY, f64::min);
+    let down = lowest + depth_m(config);
+    tracked.iter_mut().for_each(|p| p.position_m[2] -= down);
+    fit.to_m[2] -= down;
+    Ok(fit)
+}
+
+/// How deep a fitted motion presses \[m\]: no more than a third of the object's height.
+fn depth_m(config: &Config) -> f64 {
+    let [x, ..] = config.object().mesh().extents_m();
+    DEPTH_M.min(0.3 * top_height_m(config, 0.5 * x))
+}
+
 /// The middle half of the object, from a press of `DEPTH_M` to `CLEARANCE_M` above the surface.
 pub fn room_above(config: &Config, tool: usize) -> Workspace {
     let [x, y, _] = config.object().mesh().extents_m();
@@ -130,5 +150,45 @@ pub fn tip_radius_m(tool: &ToolDescription) -> f64 {
         ToolShape::Cuboid { half_extents_m } => half_extents_m[2],
         ToolShape::ConvexHull { points_m } => lowest(&mut points_m.iter().map(|p| p.z)),
         ToolShape::Compound { hulls_m } => lowest(&mut hulls_m.iter().flatten().map(|p| p.z)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+    use super::*;
+
+    fn write(name: &str, text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        (folder, path)
+    }
+
+    #[test]
+    fn a_fitted_motion_presses_as_deep_as_it_should_and_no_deeper() {
+        let config = Config::built_in().unwrap();
+        let (_folder, path) =
+            write("flat.tum", "0 0 0 1 0 0 0 1\n1 4 0 1 0 0 0 1\n2 4 1 1.1 0 0 0 1\n3 0 1 1.2 0 0 0 1\n");
+        let (poses, fit) = read(&path, &config, None, true).unwrap();
+        assert!(fit.is_some());
+        let height = |p: &TimedPose| p.pose.position_m[2] - 0.007 - top_height_m(&config, p.pose.position_m[0]);
+        let lowest = poses.iter().map(height).fold(f64::INFINITY, f64::min);
+        assert!((lowest + depth_m(&config)).abs() < 1e-9, "{lowest}");
+        assert!(poses.iter().all(|p| (0.03..=0.09).contains(&p.pose.position_m[0])));
+    }
+
+    #[test]
+    fn tools_are_found_by_name_and_poses_are_numbered() {
+        let config = Config::built_in().unwrap();
+        let header = "time_s,tool,px,py,pz,qx,qy,qz,qw\n";
+        let (_folder, path) = write("a.csv", &format!("{header}0,probe,0,0,0.1,0,0,0,1\n0.5,,0,0,0.2,0,0,0,1\n"));
+        let (poses, _) = read(&path, &config, None, false).unwrap();
+        assert_eq!(poses.iter().map(|p| p.pose.sequence).collect::<Vec<_>>(), [1, 2]);
+        assert_eq!(poses[1].pose.source_time_ns, 500_000_000);
+        let (_folder, path) = write("b.csv", &format!("{header}0,drill,0,0,0.1,0,0,0,1\n"));
+        let message = read(&path, &config, None, false).unwrap_err().to_string();
+        assert!(message.contains("`drill`") && message.contains("probe"), "{message}");
     }
 }
