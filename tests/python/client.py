@@ -99,9 +99,11 @@ class Client:
         assert hashlib.sha256(whole).hexdigest() == header["sha256"]
         return whole
 
-    def publisher(self, tool="probe"):
-        key = f"{self.root}/tool/{tool}/pose"
-        return self.session.declare_publisher(key, express=True, priority=zenoh.Priority.REAL_TIME)
+    def publisher(self, tool="probe", lossless=False):
+        """As the protocol advises; `lossless` waits for room instead of dropping, for tests that count."""
+        control = zenoh.CongestionControl.BLOCK if lossless else zenoh.CongestionControl.DROP
+        return self.session.declare_publisher(f"{self.root}/tool/{tool}/pose", express=True,
+                                              priority=zenoh.Priority.REAL_TIME, congestion_control=control)
 
     def collect(self, key, read):
         """Everything that arrives on a stream, read, in a list that grows."""

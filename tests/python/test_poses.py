@@ -67,7 +67,7 @@ def count(kinds):
 
 def test_malformed_poses_are_counted_by_kind_and_change_nothing(client):
     rest, tick = client.frame().positions, client.status()["tick"]
-    publisher = client.publisher()
+    publisher = client.publisher(lossless=True)
     for _, payload in BINARY:
         publisher.put(payload)
     for _, payload in JSON:
@@ -86,7 +86,7 @@ def test_malformed_poses_are_counted_by_kind_and_change_nothing(client):
 
 
 def test_a_quaternion_near_unit_length_is_taken(client):
-    publisher, source = client.publisher(), Source()
+    publisher, source = client.publisher(lossless=True), Source()
     publisher.put(source.pose((0.06, 0.03, 0.08), orientation=(0, 0, 0, 1.009)))
     publisher.put(json_pose(position=[0.06, 0.03, 0.08], orientation=[0, 0, 0, 0.991], source_id=source.source_id),
                   encoding=zenoh.Encoding.APPLICATION_JSON)
@@ -96,13 +96,13 @@ def test_a_quaternion_near_unit_length_is_taken(client):
 
 def test_poses_of_unknown_tools_are_counted(client):
     for name in ("knife", "pro", "probe2"):
-        client.publisher(name).put(pose(INSIDE))
+        client.publisher(name, lossless=True).put(pose(INSIDE))
     wait_until(lambda: client.status()["rejected"].get("unknown_tool") == 3, "three unknown tools")
     assert list(client.status()["tools"]) == ["probe"]
 
 
 def test_repeated_and_late_sequences_are_counted(client):
-    publisher = client.publisher()
+    publisher = client.publisher(lossless=True)
     high = (0.06, 0.03, 0.08)
     for sequence in (1, 2, 2, 5, 4, 3, 5, 6):
         publisher.put(pose(high, sequence=sequence, source_id=7))
@@ -111,7 +111,7 @@ def test_repeated_and_late_sequences_are_counted(client):
 
 
 def test_a_second_publisher_is_a_conflict_and_a_restarted_one_takes_over(client):
-    publisher = client.publisher()
+    publisher = client.publisher(lossless=True)
     high = (0.06, 0.03, 0.08)
     first, second = Source(), Source()
     for _ in range(10):
@@ -133,7 +133,7 @@ def test_a_second_publisher_is_a_conflict_and_a_restarted_one_takes_over(client)
 
 
 def test_a_teleporting_tool_is_counted_and_harmless(client):
-    publisher, source = client.publisher(), Source()
+    publisher, source = client.publisher(lossless=True), Source()
     for i in range(200):
         height = 0.5 if i % 2 else 0.015
         publisher.put(source.pose((0.06, 0.03, height)))
@@ -150,7 +150,7 @@ def test_a_teleporting_tool_is_counted_and_harmless(client):
 def test_unread_bytes_are_checked_before_they_are_believed(client):
     """Random bytes of the right length with the right magic: whatever they hold, the daemon lives and stays finite."""
     generator = np.random.default_rng(1)
-    publisher = client.publisher()
+    publisher = client.publisher(lossless=True)
     for _ in range(300):
         publisher.put(struct.pack("<4sHH", b"PLPS", 1, 96) + generator.bytes(88))
     seen = lambda: probe(client)["poses_accepted"] + sum(probe(client)["poses_rejected"].values())
