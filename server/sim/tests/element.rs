@@ -293,20 +293,24 @@ fn rigid_motion_of_a_free_block_meets_no_force() {
     }
 }
 
+/// Weights may be stored in 16 bits, which is a part in 3e4 of a displacement; rows keep their sum.
 #[test]
 fn skin_follows_the_rows_of_the_embedding() {
     let model = instantaneous(Scene::wedge(E, 0.45).with(|d| d.fixed.fill(false)));
     let mut run = common::Run::new(model);
     let mut random = Random(3);
-    let u: Vec<_> = (0..run.model.n_nodes()).map(|_| random.vector() * 5e-3).collect();
-    run.state.set_node_displacements(&run.model, &u);
-    let d = run.model.description();
-    let expected = d.embedding.apply(&u);
-    let error = run.offsets().iter().zip(&expected).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-    assert!(error < 1e-6 * 0.12, "{error:e} m");
-    let apart = |(s, (p, o)): (&Point3<f64>, (&Point3<f64>, &Vector3<f64>))| (s - (p + o)).norm();
-    let error = run.skin().iter().zip(d.skin.positions().iter().zip(&expected)).map(apart).fold(0.0, f64::max);
-    assert!(error < 1e-6 * 0.12, "{error:e} m");
+    let scattered: Vec<_> = (0..run.model.n_nodes()).map(|_| random.vector() * 5e-3).collect();
+    let shifted = vec![Vector3::new(0.02, -0.01, 0.03); run.model.n_nodes()];
+    for u in [scattered, shifted] {
+        run.state.set_node_displacements(&run.model, &u);
+        let d = run.model.description();
+        let expected = d.embedding.apply(&u);
+        let offset_error = run.offsets().iter().zip(&expected).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        let positions = d.skin.positions().iter().zip(&expected).map(|(p, o)| p + o);
+        let error = run.skin().iter().zip(positions).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        println!("offsets {offset_error:.1e} m, positions {error:.1e} m off");
+        assert!(offset_error < 2e-6 && error < 2e-6, "{offset_error:e} m, {error:e} m");
+    }
 }
 
 /// Rows push nodes with the transpose of what moves the skin: what the tool loses the free block gains, momentum and moment of
