@@ -74,17 +74,12 @@ fn best_cut(features: &[Feature], vertices: &[VertexIdx]) -> (usize, f64) {
     let mut spreads_after = running_spread(features, vertices.iter().rev());
     spreads_after.reverse();
     let cuts = (CLUSTER_SIZE..vertices.len()).step_by(CLUSTER_SIZE);
-    let best = cuts
-        .map(|cut| (cut, spreads_before[cut] + spreads_after[cut]))
-        .min_by(|a, b| a.1.total_cmp(&b.1));
+    let best = cuts.map(|cut| (cut, spreads_before[cut] + spreads_after[cut])).min_by(|a, b| a.1.total_cmp(&b.1));
     best.expect("more vertices than a cluster holds leave a cut")
 }
 
 /// Spread of the first `k` vertices for `k = 0 .. n`.
-fn running_spread<'a>(
-    features: &[Feature],
-    vertices: impl Iterator<Item = &'a VertexIdx>,
-) -> Vec<f64> {
+fn running_spread<'a>(features: &[Feature], vertices: impl Iterator<Item = &'a VertexIdx>) -> Vec<f64> {
     let (mut n, mut sum, mut sum_squared) = (0.0, Feature::zeros(), 0.0);
     let mut spreads = vec![0.0];
     for v in vertices {

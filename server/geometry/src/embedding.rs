@@ -31,9 +31,7 @@ pub enum EmbeddingKind {
 
 impl Default for EmbeddingKind {
     fn default() -> Self {
-        Self::MovingLeastSquares {
-            support_cells: DEFAULT_SUPPORT_CELLS,
-        }
+        Self::MovingLeastSquares { support_cells: DEFAULT_SUPPORT_CELLS }
     }
 }
 
@@ -62,9 +60,7 @@ pub enum EmbeddingError {
         limit_m: f64,
     },
     /// The support is not a positive finite number.
-    #[error(
-        "the support of moving least squares is {support_cells} cells, it must be positive and finite"
-    )]
+    #[error("the support of moving least squares is {support_cells} cells, it must be positive and finite")]
     Support {
         /// What was asked for.
         support_cells: f64,
@@ -99,16 +95,10 @@ impl Embedding {
     ///
     /// # Errors
     /// See [`EmbeddingError`].
-    pub fn new(
-        mesh: &HexMesh,
-        points: &[Point3<f64>],
-        kind: EmbeddingKind,
-    ) -> Result<Self, EmbeddingError> {
+    pub fn new(mesh: &HexMesh, points: &[Point3<f64>], kind: EmbeddingKind) -> Result<Self, EmbeddingError> {
         let cell_m = mesh.mean_longest_edge();
         let radius_m = match kind {
-            EmbeddingKind::MovingLeastSquares { support_cells } => {
-                checked_support(support_cells)? * cell_m
-            }
+            EmbeddingKind::MovingLeastSquares { support_cells } => checked_support(support_cells)? * cell_m,
             EmbeddingKind::Trilinear => 0.0,
         };
         let mut neighbourhoods = Neighbourhoods::new(mesh, radius_m);
@@ -153,13 +143,7 @@ impl Embedding {
     pub fn apply(&self, nodal: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         assert_eq!(nodal.len(), self.n_nodes, "one vector per node");
         (0..self.n_rows())
-            .map(|v| {
-                self.row(v)
-                    .iter()
-                    .fold(Vector3::zeros(), |sum, &(node, w)| {
-                        sum + w * nodal[node.index()]
-                    })
-            })
+            .map(|v| self.row(v).iter().fold(Vector3::zeros(), |sum, &(node, w)| sum + w * nodal[node.index()]))
             .collect()
     }
 
@@ -201,12 +185,7 @@ impl Embedding {
     fn empty(n_nodes: usize, n_rows: usize) -> Self {
         let mut row_starts = Vec::with_capacity(n_rows + 1);
         row_starts.push(0);
-        Self {
-            n_nodes,
-            row_starts,
-            entries: Vec::new(),
-            fallbacks: Vec::new(),
-        }
+        Self { n_nodes, row_starts, entries: Vec::new(), fallbacks: Vec::new() }
     }
 
     fn push(&mut self, row: Vec<(NodeIdx, f64)>) {
@@ -217,33 +196,19 @@ impl Embedding {
 
 fn checked_support(support_cells: f64) -> Result<f64, EmbeddingError> {
     let valid = support_cells.is_finite() && support_cells > 0.0;
-    valid
-        .then_some(support_cells)
-        .ok_or(EmbeddingError::Support { support_cells })
+    valid.then_some(support_cells).ok_or(EmbeddingError::Support { support_cells })
 }
 
-fn located(
-    mesh: &HexMesh,
-    x: &Point3<f64>,
-    point: VertexIdx,
-    limit_m: f64,
-) -> Result<Location, EmbeddingError> {
+fn located(mesh: &HexMesh, x: &Point3<f64>, point: VertexIdx, limit_m: f64) -> Result<Location, EmbeddingError> {
     let position = x.coords.into();
     if x.iter().any(|c| !c.is_finite()) {
         return Err(EmbeddingError::NonFinite { point, position });
     }
-    locate(mesh, x, limit_m).ok_or(EmbeddingError::Outside {
-        point,
-        position,
-        limit_m,
-    })
+    locate(mesh, x, limit_m).ok_or(EmbeddingError::Outside { point, position, limit_m })
 }
 
 fn trilinear_row(mesh: &HexMesh, location: &Location) -> Vec<(NodeIdx, f64)> {
-    let mut row: Vec<_> = mesh.hexes()[location.hex.index()]
-        .into_iter()
-        .zip(shape_functions(location.xi))
-        .collect();
+    let mut row: Vec<_> = mesh.hexes()[location.hex.index()].into_iter().zip(shape_functions(location.xi)).collect();
     row.retain(|&(_, weight)| weight != 0.0);
     row.sort_unstable_by_key(|&(node, _)| node);
     row
@@ -269,11 +234,7 @@ fn moving_least_squares_row(
         m + weight(d / radius_m) * p * p.transpose()
     });
     let b = solve_well_conditioned(&moment, &Vector4::x())?;
-    Some(
-        near.iter()
-            .map(|&(node, d)| (node, weight(d / radius_m) * b.dot(&basis(node))))
-            .collect(),
-    )
+    Some(near.iter().map(|&(node, d)| (node, weight(d / radius_m) * b.dot(&basis(node)))).collect())
 }
 
 /// `M^-1 e`, with one step of iterative refinement; `None` where `M` is ill-conditioned.

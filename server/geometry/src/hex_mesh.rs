@@ -8,14 +8,8 @@ use crate::index::{HexIdx, NodeIdx};
 use crate::isoparametric;
 
 /// The six faces of a hexahedron as corner numbers, counter-clockwise seen from outside.
-pub const HEX_FACES: [[usize; 4]; 6] = [
-    [0, 3, 2, 1],
-    [4, 5, 6, 7],
-    [0, 1, 5, 4],
-    [1, 2, 6, 5],
-    [2, 3, 7, 6],
-    [3, 0, 4, 7],
-];
+pub const HEX_FACES: [[usize; 4]; 6] =
+    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
 
 /// A corner's `det J` must exceed this share of `longest_edge^3`: below it the element is flat for all that
 /// rounding can tell.
@@ -139,17 +133,12 @@ impl HexMesh {
 
     /// Volume \[m^3\].
     pub fn volume(&self) -> f64 {
-        self.hex_indices()
-            .map(|hex| isoparametric::volume(&self.corner_positions(hex)))
-            .sum()
+        self.hex_indices().map(|hex| isoparametric::volume(&self.corner_positions(hex))).sum()
     }
 
     /// Mean over the hexahedra of the longest edge \[m\]: the mesh's cell size.
     pub fn mean_longest_edge(&self) -> f64 {
-        let sum: f64 = self
-            .hex_indices()
-            .map(|hex| isoparametric::longest_edge(&self.corner_positions(hex)))
-            .sum();
+        let sum: f64 = self.hex_indices().map(|hex| isoparametric::longest_edge(&self.corner_positions(hex))).sum();
         sum / self.n_hexes() as f64
     }
 
@@ -157,9 +146,7 @@ impl HexMesh {
     /// the hexahedra.
     pub fn boundary_quads(&self) -> Vec<[NodeIdx; 4]> {
         let counts = self.face_counts();
-        self.faces()
-            .filter(|face| counts[&sorted(*face)] == 1)
-            .collect()
+        self.faces().filter(|face| counts[&sorted(*face)] == 1).collect()
     }
 
     /// For every node the hexahedra that have it as a corner, in increasing order, `[n_nodes]`.
@@ -178,8 +165,7 @@ impl HexMesh {
         let mut neighbours = vec![Vec::new(); self.n_nodes()];
         for corners in &self.hexes {
             for &node in corners {
-                neighbours[node.index()]
-                    .extend(corners.iter().copied().filter(|&other| other != node));
+                neighbours[node.index()].extend(corners.iter().copied().filter(|&other| other != node));
             }
         }
         for list in &mut neighbours {
@@ -190,9 +176,7 @@ impl HexMesh {
     }
 
     fn faces(&self) -> impl Iterator<Item = [NodeIdx; 4]> + '_ {
-        self.hexes
-            .iter()
-            .flat_map(|corners| HEX_FACES.map(|face| face.map(|corner| corners[corner])))
+        self.hexes.iter().flat_map(|corners| HEX_FACES.map(|face| face.map(|corner| corners[corner])))
     }
 
     fn face_counts(&self) -> HashMap<[NodeIdx; 4], usize> {
@@ -205,19 +189,12 @@ impl HexMesh {
 
     fn check_nodes(&self) -> Result<(), MeshError> {
         if self.hexes.is_empty() {
-            return Err(MeshError::Empty {
-                n_nodes: self.n_nodes(),
-            });
+            return Err(MeshError::Empty { n_nodes: self.n_nodes() });
         }
-        match self
-            .nodes
-            .iter()
-            .position(|x| x.iter().any(|c| !c.is_finite()))
-        {
-            Some(i) => Err(MeshError::NonFinite {
-                node: NodeIdx::from_index(i),
-                position: self.nodes[i].coords.into(),
-            }),
+        match self.nodes.iter().position(|x| x.iter().any(|c| !c.is_finite())) {
+            Some(i) => {
+                Err(MeshError::NonFinite { node: NodeIdx::from_index(i), position: self.nodes[i].coords.into() })
+            }
             None => Ok(()),
         }
     }
@@ -227,12 +204,7 @@ impl HexMesh {
         for (hex, corners) in self.hexes.iter().enumerate() {
             if let Some(corner) = corners.iter().position(|node| node.index() >= n_nodes) {
                 let (hex, node) = (HexIdx::from_index(hex), corners[corner]);
-                return Err(MeshError::NodeOutOfRange {
-                    hex,
-                    corner,
-                    node,
-                    n_nodes,
-                });
+                return Err(MeshError::NodeOutOfRange { hex, corner, node, n_nodes });
             }
         }
         Ok(())
@@ -246,12 +218,7 @@ impl HexMesh {
                 let determinant = isoparametric::jacobian(&positions, xi).determinant();
                 let is_upright = determinant > limit;
                 if !is_upright {
-                    return Err(MeshError::Inverted {
-                        hex,
-                        corner,
-                        determinant,
-                        limit,
-                    });
+                    return Err(MeshError::Inverted { hex, corner, determinant, limit });
                 }
             }
         }
@@ -261,10 +228,7 @@ impl HexMesh {
     fn check_use(&self) -> Result<(), MeshError> {
         let n_nodes = self.n_nodes();
         let mut used = vec![false; n_nodes];
-        self.hexes
-            .iter()
-            .flatten()
-            .for_each(|node| used[node.index()] = true);
+        self.hexes.iter().flatten().for_each(|node| used[node.index()] = true);
         match used.iter().position(|&u| !u) {
             Some(first) => Err(MeshError::UnusedNodes {
                 first: NodeIdx::from_index(first),
@@ -276,12 +240,7 @@ impl HexMesh {
     }
 
     fn check_faces(&self) -> Result<(), MeshError> {
-        match self
-            .face_counts()
-            .into_iter()
-            .filter(|&(_, count)| count > 2)
-            .min()
-        {
+        match self.face_counts().into_iter().filter(|&(_, count)| count > 2).min() {
             Some((face, n_hexes)) => Err(MeshError::CrowdedFace { face, n_hexes }),
             None => Ok(()),
         }

@@ -28,67 +28,37 @@ pub fn shape_functions(xi: [f64; 3]) -> [f64; 8] {
 pub fn shape_gradients(xi: [f64; 3]) -> [[f64; 3]; 8] {
     CORNERS.map(|c| {
         let f = [1.0 + c[0] * xi[0], 1.0 + c[1] * xi[1], 1.0 + c[2] * xi[2]];
-        [
-            0.125 * c[0] * f[1] * f[2],
-            0.125 * c[1] * f[0] * f[2],
-            0.125 * c[2] * f[0] * f[1],
-        ]
+        [0.125 * c[0] * f[1] * f[2], 0.125 * c[1] * f[0] * f[2], 0.125 * c[2] * f[0] * f[1]]
     })
 }
 
 /// `X(xi) = sum_a N_a(xi) X_a` \[m\].
 pub fn map(corners: &[Point3<f64>; 8], xi: [f64; 3]) -> Point3<f64> {
     let weights = shape_functions(xi);
-    let sum = corners
-        .iter()
-        .zip(weights)
-        .fold(Vector3::zeros(), |sum, (x, n)| sum + n * x.coords);
+    let sum = corners.iter().zip(weights).fold(Vector3::zeros(), |sum, (x, n)| sum + n * x.coords);
     Point3::from(sum)
 }
 
 /// `J = dX / dxi = sum_a X_a (dN_a / dxi)^T` \[m\]; its determinant is positive in a valid element.
 pub fn jacobian(corners: &[Point3<f64>; 8], xi: [f64; 3]) -> Matrix3<f64> {
     let gradients = shape_gradients(xi);
-    corners
-        .iter()
-        .zip(gradients)
-        .fold(Matrix3::zeros(), |sum, (x, g)| {
-            sum + x.coords * Vector3::from(g).transpose()
-        })
+    corners.iter().zip(gradients).fold(Matrix3::zeros(), |sum, (x, g)| sum + x.coords * Vector3::from(g).transpose())
 }
 
 /// Volume \[m^3\]: the integral of `det J` by 2 x 2 x 2 Gauss points, which is exact (`det J` is at most quadratic
 /// in each coordinate).
 pub fn volume(corners: &[Point3<f64>; 8]) -> f64 {
     let g = 1.0 / 3.0_f64.sqrt();
-    CORNERS
-        .iter()
-        .map(|c| jacobian(corners, c.map(|x| x * g)).determinant())
-        .sum()
+    CORNERS.iter().map(|c| jacobian(corners, c.map(|x| x * g)).determinant()).sum()
 }
 
 /// The longest of the twelve edges \[m\].
 pub fn longest_edge(corners: &[Point3<f64>; 8]) -> f64 {
-    EDGES
-        .iter()
-        .map(|&[a, b]| (corners[a] - corners[b]).norm())
-        .fold(0.0, f64::max)
+    EDGES.iter().map(|&[a, b]| (corners[a] - corners[b]).norm()).fold(0.0, f64::max)
 }
 
-const EDGES: [[usize; 2]; 12] = [
-    [0, 1],
-    [1, 2],
-    [2, 3],
-    [3, 0],
-    [4, 5],
-    [5, 6],
-    [6, 7],
-    [7, 4],
-    [0, 4],
-    [1, 5],
-    [2, 6],
-    [3, 7],
-];
+const EDGES: [[usize; 2]; 12] =
+    [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
 
 /// The reference coordinates of `x`: solves `X(xi) = x` by Newton's method from the centre. Works outside the
 /// element too, as far as the trilinear map can be inverted there.

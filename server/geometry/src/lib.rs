@@ -15,9 +15,7 @@ pub mod shapes;
 mod skin;
 
 pub use clusters::CLUSTER_SIZE;
-pub use embedding::{
-    DEFAULT_SUPPORT_CELLS, Embedding, EmbeddingError, EmbeddingKind, MAX_OUTSIDE_CELLS,
-};
+pub use embedding::{DEFAULT_SUPPORT_CELLS, Embedding, EmbeddingError, EmbeddingKind, MAX_OUTSIDE_CELLS};
 pub use hex_mesh::{HEX_FACES, HexMesh, MeshError};
 pub use index::{HexIdx, NodeIdx, TriangleIdx, VertexIdx};
 pub use locate::{Location, locate};

@@ -45,16 +45,8 @@ pub fn locate(mesh: &HexMesh, x: &Point3<f64>, max_distance_m: f64) -> Option<Lo
 fn locate_in(corners: &[Point3<f64>; 8], hex: HexIdx, x: &Point3<f64>) -> Option<Location> {
     let xi = inverse_map(corners, x)?;
     let inside = xi.iter().all(|c| c.abs() <= 1.0 + INSIDE_TOLERANCE);
-    let distance_m = if inside {
-        0.0
-    } else {
-        (map(corners, xi.map(|c| c.clamp(-1.0, 1.0))) - x).norm()
-    };
-    Some(Location {
-        hex,
-        xi,
-        distance_m,
-    })
+    let distance_m = if inside { 0.0 } else { (map(corners, xi.map(|c| c.clamp(-1.0, 1.0))) - x).norm() };
+    Some(Location { hex, xi, distance_m })
 }
 
 fn distance_to_box(corners: &[Point3<f64>; 8], x: &Point3<f64>) -> f64 {

@@ -20,13 +20,7 @@ pub(crate) struct Neighbourhoods<'a> {
 impl<'a> Neighbourhoods<'a> {
     pub(crate) fn new(mesh: &'a HexMesh, radius_m: f64) -> Self {
         let (neighbours, seen) = (mesh.node_neighbours(), vec![false; mesh.n_nodes()]);
-        Self {
-            mesh,
-            neighbours,
-            radius_m,
-            seen,
-            queue: BinaryHeap::new(),
-        }
+        Self { mesh, neighbours, radius_m, seen, queue: BinaryHeap::new() }
     }
 
     /// Nodes within the radius of `x` with their chain distance \[m\], in increasing order of node.
@@ -51,9 +45,7 @@ impl<'a> Neighbourhoods<'a> {
                 self.reach(x, self.neighbours[node.index()][i], distance_m);
             }
         }
-        found
-            .iter()
-            .for_each(|(node, _)| self.seen[node.index()] = false);
+        found.iter().for_each(|(node, _)| self.seen[node.index()] = false);
         found.sort_unstable_by_key(|&(node, _)| node);
         found
     }
@@ -77,10 +69,7 @@ impl Eq for Reached {}
 
 impl Ord for Reached {
     fn cmp(&self, other: &Self) -> Ordering {
-        other
-            .distance_m
-            .total_cmp(&self.distance_m)
-            .then_with(|| other.node.cmp(&self.node))
+        other.distance_m.total_cmp(&self.distance_m).then_with(|| other.node.cmp(&self.node))
     }
 }
 

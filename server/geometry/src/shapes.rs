@@ -30,12 +30,7 @@ pub struct Wedge {
 
 impl Default for Wedge {
     fn default() -> Self {
-        Self {
-            length_m: 0.12,
-            width_m: 0.06,
-            thick_height_m: 0.04,
-            thin_height_m: 0.01,
-        }
+        Self { length_m: 0.12, width_m: 0.06, thick_height_m: 0.04, thin_height_m: 0.01 }
     }
 }
 
@@ -47,17 +42,9 @@ impl Wedge {
     }
 
     fn check(&self) {
-        let sizes = [
-            self.length_m,
-            self.width_m,
-            self.thick_height_m,
-            self.thin_height_m,
-        ];
+        let sizes = [self.length_m, self.width_m, self.thick_height_m, self.thin_height_m];
         let valid = sizes.iter().all(|size| size.is_finite() && *size > 0.0);
-        assert!(
-            valid,
-            "sizes of a shape must be positive and finite, they are {sizes:?} m"
-        );
+        assert!(valid, "sizes of a shape must be positive and finite, they are {sizes:?} m");
     }
 }
 
@@ -76,31 +63,18 @@ pub fn block(size_m: [f64; 3], divisions: [usize; 3]) -> HexMesh {
 /// If a size is not positive and finite or a division is 0.
 pub fn wedge(wedge: &Wedge, divisions: [usize; 3]) -> HexMesh {
     wedge.check();
-    assert!(
-        divisions.iter().all(|&n| n > 0),
-        "divisions must be at least 1, they are {divisions:?}"
-    );
+    assert!(divisions.iter().all(|&n| n > 0), "divisions must be at least 1, they are {divisions:?}");
     let share = |i: usize, axis: usize| i as f64 / divisions[axis] as f64;
     let nodes = lattice(divisions.map(|n| n + 1)).map(|[i, j, k]| {
         let x = share(i, 0) * wedge.length_m;
-        Point3::new(
-            x,
-            share(j, 1) * wedge.width_m,
-            share(k, 2) * wedge.height_m(x),
-        )
+        Point3::new(x, share(j, 1) * wedge.width_m, share(k, 2) * wedge.height_m(x))
     });
     let hexes = lattice(divisions).map(|cell| hex_corners(cell, divisions));
-    HexMesh::new(nodes.collect(), hexes.collect())
-        .expect("a wedge of positive sizes makes valid hexahedra")
+    HexMesh::new(nodes.collect(), hexes.collect()).expect("a wedge of positive sizes makes valid hexahedra")
 }
 
 fn block_as_wedge([length_m, width_m, height_m]: [f64; 3]) -> Wedge {
-    Wedge {
-        length_m,
-        width_m,
-        thick_height_m: height_m,
-        thin_height_m: height_m,
-    }
+    Wedge { length_m, width_m, thick_height_m: height_m, thin_height_m: height_m }
 }
 
 /// `[i, j, k]` with `i` running fastest.
@@ -109,8 +83,7 @@ fn lattice([n_x, n_y, n_z]: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
 }
 
 fn hex_corners([i, j, k]: [usize; 3], [n_x, n_y, _]: [usize; 3]) -> [NodeIdx; 8] {
-    let node =
-        |di, dj, dk| NodeIdx::from_index((i + di) + (n_x + 1) * ((j + dj) + (n_y + 1) * (k + dk)));
+    let node = |di, dj, dk| NodeIdx::from_index((i + di) + (n_x + 1) * ((j + dj) + (n_y + 1) * (k + dk)));
     [
         node(0, 0, 0),
         node(1, 0, 0),

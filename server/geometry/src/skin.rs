@@ -19,14 +19,8 @@ impl Skin {
     ///
     /// # Errors
     /// See [`SkinError`]; the first fault found is named with its numbers.
-    pub fn new(
-        positions: Vec<Point3<f64>>,
-        triangles: Vec<[VertexIdx; 3]>,
-    ) -> Result<Self, SkinError> {
-        let skin = Self {
-            positions,
-            triangles,
-        };
+    pub fn new(positions: Vec<Point3<f64>>, triangles: Vec<[VertexIdx; 3]>) -> Result<Self, SkinError> {
+        let skin = Self { positions, triangles };
         skin.check_values()?;
         skin.check_manifold()?;
         let volume = skin.volume();
@@ -79,8 +73,7 @@ impl Skin {
 
     /// Triangle areas \[m^2\], `[n_triangles]`.
     pub fn triangle_areas(&self) -> Vec<f64> {
-        let corners =
-            (0..self.n_triangles()).map(|t| self.corner_positions(TriangleIdx::from_index(t)));
+        let corners = (0..self.n_triangles()).map(|t| self.corner_positions(TriangleIdx::from_index(t)));
         corners.map(|x| area_vector(&x).norm()).collect()
     }
 
@@ -103,12 +96,8 @@ impl Skin {
 
     /// Every edge once, smaller vertex first, in increasing order, `[n_edges]`.
     pub fn edges(&self) -> Vec<[VertexIdx; 2]> {
-        let mut edges: Vec<_> = self
-            .triangles
-            .iter()
-            .flat_map(|&t| triangle_edges(t))
-            .filter(|e| e[0] < e[1])
-            .collect();
+        let mut edges: Vec<_> =
+            self.triangles.iter().flat_map(|&t| triangle_edges(t)).filter(|e| e[0] < e[1]).collect();
         edges.sort_unstable();
         edges
     }
@@ -121,10 +110,7 @@ impl Skin {
             let found = edges.binary_search(&[a.min(b), a.max(b)]);
             found.expect("a closed skin holds every edge in both directions") as u32
         };
-        self.triangles
-            .iter()
-            .map(|&t| triangle_edges(t).map(find))
-            .collect()
+        self.triangles.iter().map(|&t| triangle_edges(t).map(find)).collect()
     }
 
     /// `V - E + F`: 2 for a surface without handles.
@@ -143,20 +129,10 @@ impl Skin {
         for (new, old) in order.iter().enumerate() {
             new_of_old[old.index()] = VertexIdx::from_index(new);
         }
-        let positions = order
-            .iter()
-            .map(|old| self.positions[old.index()])
-            .collect();
-        let mut triangles: Vec<_> = self
-            .triangles
-            .iter()
-            .map(|t| t.map(|v| new_of_old[v.index()]))
-            .collect();
+        let positions = order.iter().map(|old| self.positions[old.index()]).collect();
+        let mut triangles: Vec<_> = self.triangles.iter().map(|t| t.map(|v| new_of_old[v.index()])).collect();
         triangles.sort_by_key(|t| t.iter().min().copied());
-        Self {
-            positions,
-            triangles,
-        }
+        Self { positions, triangles }
     }
 }
 

@@ -21,10 +21,7 @@ fn triangles_by_position(skin: &Skin) -> HashSet<[[u64; 3]; 3]> {
         corners.rotate_left(least);
         corners
     };
-    skin.triangles()
-        .iter()
-        .map(|t| turned(t.map(|v| bits(&skin.positions()[v.index()]))))
-        .collect()
+    skin.triangles().iter().map(|t| turned(t.map(|v| bits(&skin.positions()[v.index()])))).collect()
 }
 
 #[test]
@@ -32,23 +29,12 @@ fn clusters_hold_every_vertex_once_and_leave_the_surface_as_it_is() {
     let skin = default_skin();
     let clustered = skin.clone().clustered();
     let positions = |skin: &Skin| skin.positions().iter().map(bits).collect::<HashSet<_>>();
-    assert_eq!(
-        positions(&skin).len(),
-        skin.n_vertices(),
-        "no two vertices coincide"
-    );
+    assert_eq!(positions(&skin).len(), skin.n_vertices(), "no two vertices coincide");
     assert_eq!(clustered.n_vertices(), skin.n_vertices());
     assert_eq!(positions(&clustered), positions(&skin));
-    assert_eq!(
-        triangles_by_position(&clustered),
-        triangles_by_position(&skin)
-    );
+    assert_eq!(triangles_by_position(&clustered), triangles_by_position(&skin));
     assert_ne!(clustered.positions(), skin.positions());
-    Skin::new(
-        clustered.positions().to_vec(),
-        clustered.triangles().to_vec(),
-    )
-    .unwrap();
+    Skin::new(clustered.positions().to_vec(), clustered.triangles().to_vec()).unwrap();
 }
 
 #[test]
@@ -59,42 +45,25 @@ fn clustering_is_repeatable() {
 #[test]
 fn a_skin_of_one_cluster_keeps_its_order() {
     let skin = block_skin([0.01, 0.01, 0.01], 0.008);
-    assert!(
-        skin.n_vertices() <= CLUSTER_SIZE,
-        "{} vertices",
-        skin.n_vertices()
-    );
+    assert!(skin.n_vertices() <= CLUSTER_SIZE, "{} vertices", skin.n_vertices());
     assert_eq!(skin.clone().clustered().positions(), skin.positions());
 }
 
 /// Mean and greatest number of nodes that a cluster needs.
 fn node_list_lengths(skin: &Skin, kind: EmbeddingKind) -> (f64, usize) {
     let embedding = Embedding::new(&default_wedge(), skin.positions(), kind).unwrap();
-    let lengths: Vec<usize> = embedding
-        .node_lists(CLUSTER_SIZE)
-        .iter()
-        .map(Vec::len)
-        .collect();
-    (
-        lengths.iter().sum::<usize>() as f64 / lengths.len() as f64,
-        *lengths.iter().max().unwrap(),
-    )
+    let lengths: Vec<usize> = embedding.node_lists(CLUSTER_SIZE).iter().map(Vec::len).collect();
+    (lengths.iter().sum::<usize>() as f64 / lengths.len() as f64, *lengths.iter().max().unwrap())
 }
 
 #[test]
 fn clustering_shortens_the_node_lists_of_the_wedge() {
     let (mean_before, max_before) = node_list_lengths(&default_skin(), EmbeddingKind::default());
     let (mean, max) = node_list_lengths(&default_skin().clustered(), EmbeddingKind::default());
-    let (mean_trilinear, max_trilinear) =
-        node_list_lengths(&default_skin().clustered(), EmbeddingKind::Trilinear);
-    println!(
-        "nodes per cluster, mean / max: {mean:.1} / {max} (grid order {mean_before:.1} / {max_before})"
-    );
+    let (mean_trilinear, max_trilinear) = node_list_lengths(&default_skin().clustered(), EmbeddingKind::Trilinear);
+    println!("nodes per cluster, mean / max: {mean:.1} / {max} (grid order {mean_before:.1} / {max_before})");
     println!("the same, trilinear: {mean_trilinear:.1} / {max_trilinear}");
-    assert!(
-        mean < 46.0 && max < 90,
-        "moving least squares: {mean} / {max}"
-    );
+    assert!(mean < 46.0 && max < 90, "moving least squares: {mean} / {max}");
     assert!(mean_trilinear < 16.0, "trilinear: {mean_trilinear}");
 }
 
@@ -103,16 +72,9 @@ fn clustering_shortens_the_node_lists_of_the_wedge() {
 fn clusters_keep_top_and_bottom_apart() {
     let skin = default_skin().clustered();
     let normals = skin.vertex_normals();
-    let mixed = |normals: &[nalgebra::Vector3<f64>]| {
-        normals.iter().any(|n| n.z > 0.5) && normals.iter().any(|n| n.z < -0.5)
-    };
-    let n_mixed = normals
-        .chunks(CLUSTER_SIZE)
-        .filter(|run| mixed(run))
-        .count();
+    let mixed =
+        |normals: &[nalgebra::Vector3<f64>]| normals.iter().any(|n| n.z > 0.5) && normals.iter().any(|n| n.z < -0.5);
+    let n_mixed = normals.chunks(CLUSTER_SIZE).filter(|run| mixed(run)).count();
     let n_clusters = normals.len().div_ceil(CLUSTER_SIZE);
-    assert!(
-        n_mixed <= 3,
-        "{n_mixed} of {n_clusters} clusters mix top and bottom"
-    );
+    assert!(n_mixed <= 3, "{n_mixed} of {n_clusters} clusters mix top and bottom");
 }

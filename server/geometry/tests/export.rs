@@ -14,18 +14,8 @@ fn as_f32(x: [f64; 3]) -> [f32; 3] {
 }
 
 fn skin_arrays(skin: &Skin) -> (Vec<[f32; 3]>, Vec<[f32; 3]>) {
-    let positions = skin
-        .positions()
-        .iter()
-        .map(|x| as_f32(x.coords.into()))
-        .collect();
-    (
-        positions,
-        skin.vertex_normals()
-            .iter()
-            .map(|n| as_f32((*n).into()))
-            .collect(),
-    )
+    let positions = skin.positions().iter().map(|x| as_f32(x.coords.into())).collect();
+    (positions, skin.vertex_normals().iter().map(|n| as_f32((*n).into())).collect())
 }
 
 #[test]
@@ -37,20 +27,10 @@ fn the_glb_is_read_back_vertex_by_vertex() {
     let mesh = file.meshes().next().unwrap();
     let primitive = mesh.primitives().next().unwrap();
     let reader = primitive.reader(|_| Some(binary));
-    assert_eq!(
-        reader.read_positions().unwrap().collect::<Vec<_>>(),
-        positions
-    );
+    assert_eq!(reader.read_positions().unwrap().collect::<Vec<_>>(), positions);
     assert_eq!(reader.read_normals().unwrap().collect::<Vec<_>>(), normals);
     let indices: Vec<u32> = reader.read_indices().unwrap().into_u32().collect();
-    assert_eq!(
-        indices,
-        skin.triangles()
-            .iter()
-            .flatten()
-            .map(|v| v.0)
-            .collect::<Vec<_>>()
-    );
+    assert_eq!(indices, skin.triangles().iter().flatten().map(|v| v.0).collect::<Vec<_>>());
     let bounds = primitive.bounding_box();
     assert_eq!((bounds.min, bounds.max), ([0.0; 3], [0.12, 0.06, 0.04]));
 }
@@ -79,37 +59,20 @@ fn the_vtu_is_read_back_with_its_fields() {
     let path = folder.path().join("wedge.vtu");
     let heights: Vec<f64> = mesh.nodes().iter().map(|x| x.z).collect();
     let shifts: Vec<_> = mesh.nodes().iter().map(|x| 0.5 * x.coords).collect();
-    let fields = [
-        PointField::Scalars("height_m", &heights),
-        PointField::Vectors("displacement_m", &shifts),
-    ];
+    let fields = [PointField::Scalars("height_m", &heights), PointField::Vectors("displacement_m", &shifts)];
     write_vtu(&path, &mesh, &fields).unwrap();
 
     let read = vtkio::Vtk::import(&path).unwrap();
-    let DataSet::UnstructuredGrid { pieces, .. } = read.data else {
-        panic!("another kind of grid")
-    };
-    let Piece::Inline(piece) = &pieces[0] else {
-        panic!("no inline piece")
-    };
+    let DataSet::UnstructuredGrid { pieces, .. } = read.data else { panic!("another kind of grid") };
+    let Piece::Inline(piece) = &pieces[0] else { panic!("no inline piece") };
     let flat: Vec<f64> = mesh.nodes().iter().flat_map(|x| [x.x, x.y, x.z]).collect();
     assert_eq!(piece.points.clone().into_vec::<f64>().unwrap(), flat);
     assert_eq!(piece.cells.types, vec![CellType::Hexahedron; 128]);
     let (connectivity, offsets) = piece.cells.cell_verts.clone().into_xml();
-    assert_eq!(
-        connectivity,
-        mesh.hexes()
-            .iter()
-            .flatten()
-            .map(|n| u64::from(n.0))
-            .collect::<Vec<_>>()
-    );
+    assert_eq!(connectivity, mesh.hexes().iter().flatten().map(|n| u64::from(n.0)).collect::<Vec<_>>());
     assert_eq!(offsets.last(), Some(&1024));
     let field = |k: usize| match &piece.data.point[k] {
-        Attribute::DataArray(array) => (
-            array.name.clone(),
-            array.data.clone().into_vec::<f64>().unwrap(),
-        ),
+        Attribute::DataArray(array) => (array.name.clone(), array.data.clone().into_vec::<f64>().unwrap()),
         Attribute::Field { .. } => panic!("a legacy field"),
     };
     assert_eq!(field(0), ("height_m".to_owned(), heights));
@@ -120,16 +83,8 @@ fn the_vtu_is_read_back_with_its_fields() {
 #[test]
 fn a_field_of_the_wrong_length_is_refused() {
     let path = std::path::Path::new("never-written.vtu");
-    let error = write_vtu(
-        path,
-        &default_wedge(),
-        &[PointField::Scalars("height_m", &[1.0, 2.0])],
-    )
-    .unwrap_err();
-    assert_eq!(
-        error.to_string(),
-        "point field `height_m` holds 2 values for 225 nodes"
-    );
+    let error = write_vtu(path, &default_wedge(), &[PointField::Scalars("height_m", &[1.0, 2.0])]).unwrap_err();
+    assert_eq!(error.to_string(), "point field `height_m` holds 2 values for 225 nodes");
     assert!(!path.exists());
 }
 
@@ -138,10 +93,5 @@ fn a_file_that_cannot_be_written_is_named() {
     let path = std::path::Path::new("no/such/folder/skin.glb");
     let error = write_glb(path, &[], &[], &[]).unwrap_err();
     assert!(matches!(error, ExportError::Write { .. }));
-    assert!(
-        error
-            .to_string()
-            .starts_with("cannot write no/such/folder/skin.glb: "),
-        "{error}"
-    );
+    assert!(error.to_string().starts_with("cannot write no/such/folder/skin.glb: "), "{error}");
 }

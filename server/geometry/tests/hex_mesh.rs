@@ -16,11 +16,7 @@ fn close(a: f64, b: f64, relative: f64) -> bool {
 fn the_wedge_has_the_counts_and_the_volume_of_the_scene() {
     let mesh = default_wedge();
     assert_eq!((mesh.n_hexes(), mesh.n_nodes()), (128, 225));
-    assert!(
-        close(mesh.volume(), 0.12 * 0.06 * 0.025, 1e-14),
-        "{}",
-        mesh.volume()
-    );
+    assert!(close(mesh.volume(), 0.12 * 0.06 * 0.025, 1e-14), "{}", mesh.volume());
     let fixed = mesh.nodes().iter().filter(|x| x.z == 0.0).count();
     assert_eq!(fixed, 45, "nodes of the bottom");
 }
@@ -39,10 +35,7 @@ fn a_block_fills_its_size() {
 fn volume_by_boundary(mesh: &HexMesh) -> f64 {
     let position = |node: NodeIdx| mesh.nodes()[node.index()].coords;
     let tetrahedron = |a: Vector3<f64>, b: Vector3<f64>, c: Vector3<f64>| a.dot(&b.cross(&c)) / 6.0;
-    let quads = mesh
-        .boundary_quads()
-        .into_iter()
-        .map(|quad| quad.map(position));
+    let quads = mesh.boundary_quads().into_iter().map(|quad| quad.map(position));
     // A bilinear quad's flux is the mean over its two cuts into triangles.
     let flux = |[a, b, c, d]: [Vector3<f64>; 4]| {
         let one = tetrahedron(a, b, c) + tetrahedron(a, c, d);
@@ -55,15 +48,9 @@ fn volume_by_boundary(mesh: &HexMesh) -> f64 {
 fn boundary_quads_are_outward_and_closed() {
     for mesh in [default_wedge(), distorted_block(), u_shape()] {
         let (inside, boundary) = (mesh.volume(), volume_by_boundary(&mesh));
-        assert!(
-            close(inside, boundary, 1e-12),
-            "{inside:e} against {boundary:e}"
-        );
+        assert!(close(inside, boundary, 1e-12), "{inside:e} against {boundary:e}");
     }
-    assert_eq!(
-        block([1.0; 3], [3, 2, 4]).boundary_quads().len(),
-        2 * (6 + 12 + 8)
-    );
+    assert_eq!(block([1.0; 3], [3, 2, 4]).boundary_quads().len(), 2 * (6 + 12 + 8));
 }
 
 #[test]
@@ -73,10 +60,7 @@ fn neighbourhoods_count_as_they_should() {
     let inner = 1 + 4 * (1 + 4);
     assert_eq!((hexes[0].len(), nodes[0].len()), (1, 7));
     assert_eq!((hexes[inner].len(), nodes[inner].len()), (8, 26));
-    assert_eq!(
-        hexes.iter().map(Vec::len).sum::<usize>(),
-        8 * mesh.n_hexes()
-    );
+    assert_eq!(hexes.iter().map(Vec::len).sum::<usize>(), 8 * mesh.n_hexes());
 }
 
 fn parts_of(mesh: &HexMesh) -> (Vec<Point3<f64>>, Vec<[NodeIdx; 8]>) {
@@ -87,12 +71,7 @@ fn parts_of(mesh: &HexMesh) -> (Vec<Point3<f64>>, Vec<[NodeIdx; 8]>) {
 fn an_index_out_of_range_is_refused() {
     let (nodes, mut hexes) = parts_of(&default_wedge());
     hexes[17][3] = NodeIdx(225);
-    let expected = MeshError::NodeOutOfRange {
-        hex: HexIdx(17),
-        corner: 3,
-        node: NodeIdx(225),
-        n_nodes: 225,
-    };
+    let expected = MeshError::NodeOutOfRange { hex: HexIdx(17), corner: 3, node: NodeIdx(225), n_nodes: 225 };
     assert_eq!(HexMesh::new(nodes, hexes), Err(expected));
 }
 
@@ -101,10 +80,7 @@ fn an_inverted_hexahedron_is_refused() {
     let (nodes, mut hexes) = parts_of(&default_wedge());
     hexes[5].swap(0, 6);
     let error = HexMesh::new(nodes, hexes).unwrap_err();
-    assert!(
-        matches!(error, MeshError::Inverted { hex: HexIdx(5), determinant, .. } if determinant < 0.0),
-        "{error}"
-    );
+    assert!(matches!(error, MeshError::Inverted { hex: HexIdx(5), determinant, .. } if determinant < 0.0), "{error}");
 }
 
 #[test]
@@ -112,21 +88,14 @@ fn a_flat_hexahedron_is_refused() {
     let (mut nodes, hexes) = parts_of(&block([0.1; 3], [1, 1, 1]));
     nodes.iter_mut().for_each(|x| x.z *= 1e-12);
     let error = HexMesh::new(nodes, hexes).unwrap_err();
-    assert!(
-        matches!(error, MeshError::Inverted { limit, .. } if limit > 0.0),
-        "{error}"
-    );
+    assert!(matches!(error, MeshError::Inverted { limit, .. } if limit > 0.0), "{error}");
 }
 
 #[test]
 fn an_unused_node_is_refused() {
     let (mut nodes, hexes) = parts_of(&default_wedge());
     nodes.push(Point3::new(1.0, 2.0, 3.0));
-    let expected = MeshError::UnusedNodes {
-        first: NodeIdx(225),
-        n_unused: 1,
-        n_nodes: 226,
-    };
+    let expected = MeshError::UnusedNodes { first: NodeIdx(225), n_unused: 1, n_nodes: 226 };
     assert_eq!(HexMesh::new(nodes, hexes), Err(expected));
 }
 
@@ -135,12 +104,7 @@ fn a_position_that_is_not_a_number_is_refused() {
     let (mut nodes, hexes) = parts_of(&default_wedge());
     nodes[9].y = f64::NAN;
     let error = HexMesh::new(nodes, hexes).unwrap_err();
-    assert!(
-        error
-            .to_string()
-            .starts_with("node 9 has the non-finite position [0, NaN, 0]"),
-        "{error}"
-    );
+    assert!(error.to_string().starts_with("node 9 has the non-finite position [0, NaN, 0]"), "{error}");
 }
 
 #[test]
@@ -148,18 +112,12 @@ fn a_hexahedron_given_twice_is_refused() {
     let (nodes, mut hexes) = parts_of(&block([0.1; 3], [2, 1, 1]));
     hexes.push(hexes[1]);
     let error = HexMesh::new(nodes, hexes).unwrap_err();
-    assert!(
-        matches!(error, MeshError::CrowdedFace { n_hexes: 3, .. }),
-        "{error}"
-    );
+    assert!(matches!(error, MeshError::CrowdedFace { n_hexes: 3, .. }), "{error}");
 }
 
 #[test]
 fn no_hexahedra_are_refused() {
-    assert_eq!(
-        HexMesh::new(vec![], vec![]),
-        Err(MeshError::Empty { n_nodes: 0 })
-    );
+    assert_eq!(HexMesh::new(vec![], vec![]), Err(MeshError::Empty { n_nodes: 0 }));
 }
 
 #[test]

@@ -5,9 +5,7 @@ mod common;
 
 use common::{Random, distorted_block};
 use nalgebra::Point3;
-use plica_geometry::isoparametric::{
-    CORNERS, inverse_map, jacobian, map, shape_functions, shape_gradients,
-};
+use plica_geometry::isoparametric::{CORNERS, inverse_map, jacobian, map, shape_functions, shape_gradients};
 use plica_geometry::shapes::block;
 use plica_geometry::{HEX_FACES, HexIdx, locate};
 
@@ -31,10 +29,7 @@ fn shape_functions_sum_to_one_and_gradients_to_zero() {
 fn shape_functions_are_one_at_their_own_corner_only() {
     for (a, xi) in CORNERS.into_iter().enumerate() {
         let values = shape_functions(xi);
-        assert!(
-            (0..8).all(|b| values[b] == f64::from(u8::from(a == b))),
-            "{values:?}"
-        );
+        assert!((0..8).all(|b| values[b] == f64::from(u8::from(a == b))), "{values:?}");
     }
 }
 
@@ -62,17 +57,12 @@ fn gradients_agree_with_central_differences() {
 #[test]
 fn corners_are_in_vtk_order() {
     let mesh = block([2.0; 3], [1, 1, 1]);
-    let from_reference = mesh
-        .corner_positions(HexIdx(0))
-        .map(|x| [x.x - 1.0, x.y - 1.0, x.z - 1.0]);
+    let from_reference = mesh.corner_positions(HexIdx(0)).map(|x| [x.x - 1.0, x.y - 1.0, x.z - 1.0]);
     assert_eq!(from_reference, CORNERS);
     let centre = Point3::new(1.0, 1.0, 1.0);
     for face in HEX_FACES {
         let [a, b, c, _] = face.map(|corner| mesh.corner_positions(HexIdx(0))[corner]);
-        assert!(
-            (b - a).cross(&(c - b)).dot(&(a - centre)) > 0.0,
-            "face {face:?} is outward"
-        );
+        assert!((b - a).cross(&(c - b)).dot(&(a - centre)) > 0.0, "face {face:?} is outward");
     }
 }
 
@@ -85,10 +75,7 @@ fn the_inverse_map_undoes_the_map_inside_and_a_little_outside() {
         for _ in 0..20 {
             let xi = random_xi(&mut random).map(|c| 1.3 * c);
             let found = inverse_map(&corners, &map(&corners, xi)).unwrap();
-            assert!(
-                (0..3).all(|k| (found[k] - xi[k]).abs() < 1e-11),
-                "{found:?} for {xi:?} in {hex}"
-            );
+            assert!((0..3).all(|k| (found[k] - xi[k]).abs() < 1e-11), "{found:?} for {xi:?} in {hex}");
             assert!(jacobian(&corners, xi.map(|c| c.clamp(-1.0, 1.0))).determinant() > 0.0);
         }
     }

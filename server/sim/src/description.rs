@@ -16,13 +16,13 @@ pub struct ModelDescription {
     pub fixed: Vec<bool>,
     /// Material of each hexahedron, `[n_hexes]`.
     pub materials: Vec<Material>,
-    /// Damping proportional to mass [1/s].
+    /// Damping proportional to mass \[1/s\].
     pub mass_damping_per_s: f64,
-    /// Acceleration of free fall [m/s2].
+    /// Acceleration of free fall \[m/s2\].
     pub gravity_m_per_s2: Vector3<f64>,
     /// Which hexahedron the stiffness is computed with.
     pub element: ElementKind,
-    /// Length of a tick [s].
+    /// Length of a tick \[s\].
     pub timestep_s: f64,
     /// Implicit steps per tick, each of `timestep_s / substeps`.
     pub substeps: u32,
@@ -41,18 +41,18 @@ pub struct ModelDescription {
 /// Isotropic linear elastic material.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Material {
-    /// Young's modulus [Pa].
+    /// Young's modulus \[Pa\].
     pub young_modulus_pa: f64,
     /// Poisson's ratio, in [0, 0.499].
     pub poisson_ratio: f64,
-    /// Density [kg/m3].
+    /// Density \[kg/m3\].
     pub density_kg_per_m3: f64,
 }
 
 /// The hexahedron whose stiffness is precomputed. Both cost the same at run time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ElementKind {
-    /// Enhanced strain with nine modes, condensed [SR90]: bends without locking.
+    /// Enhanced strain with nine modes, condensed \[SR90\]: bends without locking.
     #[default]
     EnhancedStrain,
     /// Trilinear, 2x2x2 Gauss points: locks in bending; kept for comparison with other systems.
@@ -93,13 +93,13 @@ pub enum Preconditioner {
 /// Contact detection and law (MATH.md, "Contact").
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactOptions {
-    /// Penalty over the effective stiffness `1/(h^2 w)` of the touched skin point [-].
+    /// Penalty over the effective stiffness `1/(h^2 w)` of the touched skin point \[-\].
     pub stiffness_ratio: f64,
     /// Share of the multiplier error corrected per tick, in (0, 1].
     pub multiplier_relaxation: f64,
-    /// A skin point whose predicted gap is below this becomes a contact row [m].
+    /// A skin point whose predicted gap is below this becomes a contact row \[m\].
     pub activation_gap_m: f64,
-    /// Time constant with which penetration found at a new contact is resolved [s].
+    /// Time constant with which penetration found at a new contact is resolved \[s\].
     pub recovery_time_s: f64,
     /// Most contact rows per tool.
     pub max_contacts: usize,
@@ -128,9 +128,9 @@ impl Default for ContactOptions {
 pub struct SleepOptions {
     /// Whether it ever does.
     pub enabled: bool,
-    /// Fastest node below which it counts as at rest [m/s].
+    /// Fastest node below which it counts as at rest \[m/s\].
     pub speed_m_per_s: f64,
-    /// How long it must have been at rest, with no tool near [s].
+    /// How long it must have been at rest, with no tool near \[s\].
     pub after_s: f64,
 }
 
@@ -153,15 +153,15 @@ pub struct ToolDescription {
     pub friction: f64,
     /// How device poses become one pose per tick.
     pub sampling: Sampling,
-    /// Fastest motion that is followed; a faster jump re-places the tool without sweep [m/s].
+    /// Fastest motion that is followed; a faster jump re-places the tool without sweep \[m/s\].
     pub max_tool_speed_m_per_s: f64,
-    /// A tool without a new pose for this long is held and flagged [s].
+    /// A tool without a new pose for this long is held and flagged \[s\].
     pub stale_after_s: f64,
     /// `world <- tracker`.
     pub world_from_tracker: Isometry3<f64>,
     /// `tool <- marker`, so that `world_from_tool = world_from_tracker * tracker_from_marker * tool_from_marker^-1`.
     pub tool_from_marker: Isometry3<f64>,
-    /// Factor on tracked positions before `world_from_tracker` [-].
+    /// Factor on tracked positions before `world_from_tracker` \[-\].
     pub position_scale: f64,
 }
 
@@ -170,29 +170,29 @@ pub struct ToolDescription {
 pub enum ToolShape {
     /// Ball around the origin.
     Ball {
-        /// Radius [m].
+        /// Radius \[m\].
         radius_m: f64,
     },
     /// Rod with round ends: from the origin (centre of the tip's hemisphere) along +z.
     Capsule {
-        /// Radius [m].
+        /// Radius \[m\].
         radius_m: f64,
-        /// Distance between the centres of the two ends [m].
+        /// Distance between the centres of the two ends \[m\].
         length_m: f64,
     },
     /// Box around the origin.
     Cuboid {
-        /// Half of each edge [m].
+        /// Half of each edge \[m\].
         half_extents_m: [f64; 3],
     },
     /// Convex hull of points.
     ConvexHull {
-        /// Points [m], at least four that do not lie in a plane.
+        /// Points \[m\], at least four that do not lie in a plane.
         points_m: Vec<Point3<f64>>,
     },
     /// Union of convex hulls (a mesh file, decomposed).
     Compound {
-        /// Points of each hull [m].
+        /// Points of each hull \[m\].
         hulls_m: Vec<Vec<Point3<f64>>>,
     },
 }
@@ -209,17 +209,17 @@ pub enum Coupling {
 /// Saturating 6-DOF spring-damper between device pose and proxy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpringCoupling {
-    /// Mass of the proxy [kg].
+    /// Mass of the proxy \[kg\].
     pub mass_kg: f64,
-    /// Spring [N/m].
+    /// Spring \[N/m\].
     pub stiffness_n_per_m: f64,
-    /// Damper [N s/m]; `None`: critical for `mass_kg`.
+    /// Damper \[N s/m\]; `None`: critical for `mass_kg`.
     pub damping_n_s_per_m: Option<f64>,
-    /// Largest force that the coupling transmits [N].
+    /// Largest force that the coupling transmits \[N\].
     pub max_force_n: f64,
-    /// Largest torque that the coupling transmits [N m].
+    /// Largest torque that the coupling transmits \[N m\].
     pub max_torque_n_m: f64,
-    /// Lever that turns the four translational numbers into rotational ones, `k_rot = k l^2` [m].
+    /// Lever that turns the four translational numbers into rotational ones, `k_rot = k l^2` \[m\].
     pub lever_m: f64,
 }
 
@@ -243,7 +243,7 @@ pub enum Sampling {
     Latest,
     /// Interpolation between samples, this far in the past.
     Interpolate {
-        /// Delay behind the newest sample's time [s].
+        /// Delay behind the newest sample's time \[s\].
         delay_s: f64,
     },
 }
@@ -251,7 +251,7 @@ pub enum Sampling {
 /// An immovable half-space: the object stays on the side that `normal` points to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plane {
-    /// A point of the surface [m].
+    /// A point of the surface \[m\].
     pub point_m: Point3<f64>,
     /// Outward direction; need not be of unit length.
     pub normal: Vector3<f64>,

@@ -38,7 +38,7 @@ pub use workspace::Workspace;
 /// What one tick is told: the time, and the device poses that arrived since the last one.
 #[derive(Debug, Clone, Copy)]
 pub struct TickInput<'a> {
-    /// The caller's clock at this tick [s]. Staleness and interpolation are judged on it; it must not run backwards.
+    /// The caller's clock at this tick \[s\]. Staleness and interpolation are judged on it; it must not run backwards.
     pub clock_s: f64,
     /// Device poses that arrived since the last tick, in order of arrival.
     pub poses: &'a [ToolPose],

@@ -13,6 +13,13 @@ use crate::solver::{BlockJacobi, BlockTridiagonal, NodeOrder, RestMatrix, WarpSc
 /// Largest factorisation that [`Preconditioner::Auto`] keeps: with the stiffness it should stay in the second-level cache.
 const AUTO_FACTOR_BYTES: usize = 1 << 21;
 
+/// A step this long is dominated by stiffness: its inverse gives the static stiffness of skin points, with enough mass left
+/// in it for an object that nothing holds \[s\].
+const QUASI_STATIC_S: f64 = 0.1;
+
+/// Least inverse mass of a skin point, as a share of the mean: points next to fixed nodes are not infinitely stiff.
+const INVERSE_MASS_FLOOR: f32 = 0.05;
+
 /// Why a model could not be built.
 #[derive(Debug, Error)]
 pub enum ModelError {
@@ -69,13 +76,13 @@ pub struct Cost {
     pub n_skin: usize,
     /// Whether the solver uses the block-tridiagonal preconditioner.
     pub block_tridiagonal: bool,
-    /// Bytes that a force evaluation or stiffness product reads [B].
+    /// Bytes that a force evaluation or stiffness product reads \[B\].
     pub product_bytes: usize,
     /// Floating-point operations of it.
     pub product_flops: usize,
-    /// Bytes that one application of the preconditioner reads [B].
+    /// Bytes that one application of the preconditioner reads \[B\].
     pub preconditioner_bytes: usize,
-    /// Bytes that the embedding reads and writes [B].
+    /// Bytes that the embedding reads and writes \[B\].
     pub embedding_bytes: usize,
 }
 
@@ -86,7 +93,7 @@ pub struct Model {
     pub(crate) order: NodeOrder,
     pub(crate) n_free: usize,
     pub(crate) elements: ElementBatches,
-    /// Lumped mass per free node [kg].
+    /// Lumped mass per free node \[kg\].
     pub(crate) node_mass: Vec<f32>,
     pub(crate) jacobi: BlockJacobi,
     pub(crate) tridiagonal: Option<BlockTridiagonal>,
@@ -94,14 +101,12 @@ pub struct Model {
     pub(crate) surface: SkinSurface,
     /// Shapes of tools, then planes.
     pub(crate) solids: Vec<Solid>,
-    /// Mean edge of the coarse mesh [m].
+    /// Mean edge of the coarse mesh \[m\].
     pub(crate) cell_size: f32,
-    /// Half the diagonal of the mesh's bounding box [m].
+    /// Half the diagonal of the mesh's bounding box \[m\].
     pub(crate) size: f32,
-    /// Length of a sub-step [s].
+    /// Length of a sub-step \[s\].
     pub(crate) dt: f32,
-    /// Least inverse mass that a contact row is given [1/kg].
-    pub(crate) inverse_mass_floor: f32,
 }
 
 impl Model {
@@ -116,25 +121,18 @@ impl Model {
         }
         let h = d.timestep_s / f64::from(d.substeps);
         let mass = node_mass(&d.mesh, &order, &d.materials);
-        let matrix = RestMatrix::new(&d.mesh, &order, &mass, &d.materials, d.element, (h, d.mass_damping_per_s));
-        let wants_factor = match d.solver.preconditioner {
-            Preconditioner::Auto => BlockTridiagonal::bytes_for(&order) <= AUTO_FACTOR_BYTES,
-            Preconditioner::BlockTridiagonal => true,
-            Preconditioner::BlockJacobi => false,
-        };
-        let tridiagonal = match wants_factor {
-            true => Some(BlockTridiagonal::new(&matrix, &order).ok_or(ModelError::Singular { n_free })?),
-            false => None,
-        };
-        let jacobi = BlockJacobi::new(&matrix);
+        let inverse = |h| RestInverse::new(d, &order, &mass, h).ok_or(ModelError::Singular { n_free });
+        let RestInverse { tridiagonal, jacobi } = inverse(h)?;
         let embedding = SkinEmbedding::new(&d.skin, &d.embedding, &order.internal_of_mesh, n_free);
         let inverse_mass = inverse_masses(&embedding, n_free, tridiagonal.as_ref(), &jacobi);
-        let mean_inverse_mass = inverse_mass.iter().sum::<f32>() / inverse_mass.len() as f32;
+        let slow = inverse(QUASI_STATIC_S)?;
+        let slow_inverse_mass = inverse_masses(&embedding, n_free, slow.tridiagonal.as_ref(), &slow.jacobi);
+        let stiffness = |w: &f32| 1.0 / (w * (QUASI_STATIC_S * QUASI_STATIC_S) as f32);
+        let static_stiffness = slow_inverse_mass.iter().map(stiffness).collect();
         Ok(Self {
-            inverse_mass_floor: 0.05 * mean_inverse_mass,
             elements: ElementBatches::new(&d.mesh, &order.internal_of_mesh, &d.materials, d.element),
             node_mass: mass[..n_free].iter().map(|&m| m as f32).collect(),
-            surface: SkinSurface::new(&d.skin, inverse_mass),
+            surface: SkinSurface::new(&d.skin, inverse_mass, static_stiffness),
             solids: solids(d)?,
             cell_size: mean_edge(&d.mesh) as f32,
             size: half_diagonal(&d.mesh) as f32,
@@ -168,7 +166,7 @@ impl Model {
         self.description.tools.len()
     }
 
-    /// Length of a tick [s].
+    /// Length of a tick \[s\].
     pub fn timestep_s(&self) -> f64 {
         self.description.timestep_s
     }
@@ -238,7 +236,7 @@ fn check(d: &ModelDescription) -> Result<(), ModelError> {
     Ok(())
 }
 
-/// Lumped mass in internal order, `[n_nodes]` [kg].
+/// Lumped mass in internal order, `[n_nodes]` \[kg\].
 fn node_mass(mesh: &HexMesh, order: &NodeOrder, materials: &[Material]) -> Vec<f64> {
     let mut mass = vec![0.0; mesh.n_nodes()];
     for (hex, material) in mesh.hexes().iter().zip(materials) {
@@ -250,7 +248,27 @@ fn node_mass(mesh: &HexMesh, order: &NodeOrder, materials: &[Material]) -> Vec<f
     mass
 }
 
-/// `tr(J A_0^-1 J^T) / 3` of each skin vertex [1/kg]: how far it yields to a unit impulse. Without a factorisation the
+/// The rest matrix of a step, inverted as far as the solver options ask for.
+struct RestInverse {
+    tridiagonal: Option<BlockTridiagonal>,
+    jacobi: BlockJacobi,
+}
+
+impl RestInverse {
+    /// `None` if a block is singular.
+    fn new(d: &ModelDescription, order: &NodeOrder, mass: &[f64], h: f64) -> Option<Self> {
+        let matrix = RestMatrix::new(&d.mesh, order, mass, &d.materials, d.element, (h, d.mass_damping_per_s));
+        let wants_factor = match d.solver.preconditioner {
+            Preconditioner::Auto => BlockTridiagonal::bytes_for(order) <= AUTO_FACTOR_BYTES,
+            Preconditioner::BlockTridiagonal => true,
+            Preconditioner::BlockJacobi => false,
+        };
+        let tridiagonal = if wants_factor { Some(BlockTridiagonal::new(&matrix, order)?) } else { None };
+        Some(Self { tridiagonal, jacobi: BlockJacobi::new(&matrix) })
+    }
+}
+
+/// `tr(J A_0^-1 J^T) / 3` of each skin vertex \[1/kg\]: how far it yields to a unit impulse. Without a factorisation the
 /// diagonal blocks stand in, which overstates the stiffness.
 fn inverse_masses(
     embedding: &SkinEmbedding,
@@ -274,7 +292,10 @@ fn inverse_masses(
         }
         trace / 3.0
     };
-    (0..embedding.n_skin()).map(&mut of_vertex).collect()
+    let mut inverse_mass: Vec<f32> = (0..embedding.n_skin()).map(&mut of_vertex).collect();
+    let floor = INVERSE_MASS_FLOOR * inverse_mass.iter().sum::<f32>() / inverse_mass.len() as f32;
+    inverse_mass.iter_mut().for_each(|w| *w = w.max(floor));
+    inverse_mass
 }
 
 fn solids(d: &ModelDescription) -> Result<Vec<Solid>, ModelError> {

@@ -15,7 +15,7 @@ pub struct TickReport {
     pub n_contacts: u32,
     /// Contact rows that were found and left out because a tool or plane had its `max_contacts`.
     pub dropped_contacts: u32,
-    /// Deepest skin point below a tool or plane surface at the end of the tick, among contact rows [m].
+    /// Deepest skin point below a tool or plane surface at the end of the tick, among contact rows \[m\].
     pub max_penetration_m: f32,
     /// Poses refused at the input gate because a component was not finite.
     pub poses_refused: u32,
@@ -30,23 +30,23 @@ pub struct TickReport {
 pub struct ToolReading {
     /// Whether a pose was ever received; an absent tool touches nothing.
     pub present: bool,
-    /// Force on the tool [N]. With a spring coupling: the bounded force that the device should display.
+    /// Force on the tool \[N\]. With a spring coupling: the bounded force that the device should display.
     pub force_n: Vector3<f64>,
-    /// Torque on the tool about the proxy's origin [N m].
+    /// Torque on the tool about the proxy's origin \[N m\].
     pub torque_n_m: Vector3<f64>,
-    /// Sum of the contact forces on the tool [N].
+    /// Sum of the contact forces on the tool \[N\].
     pub contact_force_n: Vector3<f64>,
-    /// Contact point: see DESIGN "Contact"; the last one is held after release [m].
+    /// Contact point: see DESIGN "Contact"; the last one is held after release \[m\].
     pub contact_point_m: Point3<f64>,
-    /// The same point pulled back to the reference skin [m].
+    /// The same point pulled back to the reference skin \[m\].
     pub reference_contact_point_m: Point3<f64>,
     /// Pose of the proxy.
     pub proxy: Isometry3<f64>,
     /// Sequence number of the newest pose.
     pub pose_sequence: u64,
-    /// Source time of the newest pose [ns].
+    /// Source time of the newest pose \[ns\].
     pub pose_source_time_ns: u64,
-    /// Age of the newest pose [s].
+    /// Age of the newest pose \[s\].
     pub pose_age_s: f64,
     /// Contacts that carry load.
     pub n_contacts: u32,
@@ -67,14 +67,14 @@ pub struct ToolReading {
 pub struct ContactReading {
     /// Tool index, or `n_tools + plane index`.
     pub body: usize,
-    /// The skin point, deformed [m].
+    /// The skin point, deformed \[m\].
     pub point_m: Point3<f64>,
     /// Unit normal from the tool to the skin.
     pub normal: Vector3<f64>,
-    /// Gap at the end of the tick [m].
+    /// Gap at the end of the tick \[m\].
     pub gap_m: f64,
-    /// Normal force on the skin, never negative [N].
+    /// Normal force on the skin, never negative \[N\].
     pub normal_force_n: f64,
-    /// Tangential force on the skin [N].
+    /// Tangential force on the skin \[N\].
     pub tangential_force_n: Vector3<f64>,
 }

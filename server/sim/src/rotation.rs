@@ -1,4 +1,4 @@
-//! Rotation of each element: one warm analytic-polar step per tick [KKB18].
+//! Rotation of each element: one warm analytic-polar step per tick \[KKB18\], more where an element turns fast or is inverted.
 //!
 //! `R` maximises `tr(R^T F)`. With `B = R^T F` and a further rotation `exp([omega])`, to second order
 //! `tr = tr B + g . omega - 1/2 omega^T H omega`, `g = axial(B)`, `H = tr(B) I - sym(B)`; so `omega = H^-1 g`.
@@ -13,15 +13,26 @@ pub(crate) type Quaternions = [F; 4];
 /// No rotation.
 pub(crate) const IDENTITY: Quaternions = [F::ZERO, F::ZERO, F::ZERO, F::ONE];
 
-/// Turns `q` one step towards the polar rotation of `f` and returns it as a matrix.
+/// A step that turns no lane by more than this leaves an error of the order of its square \[rad\].
+const SMALL_TURN: f32 = 0.1;
+/// Most steps in one go.
+const MAX_STEPS: u32 = 8;
+
+/// Turns `q` to the polar rotation of `f` and returns it as a matrix: one step, and more only after a large turn.
 #[inline(always)]
-pub(crate) fn warm_polar_step(q: &mut Quaternions, f: &Mat3) -> Mat3 {
-    let r = matrix(q);
-    let b = transpose_product(&r, f);
-    let gradient = [b[2][1] - b[1][2], b[0][2] - b[2][0], b[1][0] - b[0][1]];
-    let omega = cap(newton_step(&b, gradient));
-    *q = turn(q, omega);
-    matrix(q)
+pub(crate) fn warm_polar(q: &mut Quaternions, f: &Mat3) -> Mat3 {
+    let mut r = matrix(q);
+    for _ in 0..MAX_STEPS {
+        let b = transpose_product(&r, f);
+        let gradient = [b[2][1] - b[1][2], b[0][2] - b[2][0], b[1][0] - b[0][1]];
+        let omega = cap(newton_step(&b, gradient));
+        *q = turn(q, omega);
+        r = matrix(q);
+        if !dot(omega, omega).simd_gt(F::splat(SMALL_TURN * SMALL_TURN)).any() {
+            break;
+        }
+    }
+    r
 }
 
 /// `H^-1 g` where `H` is safely positive definite, else `g / |B|`.

@@ -14,9 +14,9 @@ use crate::tool::PoseTrack;
 #[derive(Debug)]
 pub struct State {
     pub(crate) tick: u64,
-    /// Nodal displacements in internal order, `[n_nodes]` [m].
+    /// Nodal displacements in internal order, `[n_nodes]` \[m\].
     pub(crate) u: Vec<Node>,
-    /// Nodal velocities [m/s].
+    /// Nodal velocities \[m/s\].
     pub(crate) v: Vec<Node>,
     /// Rotation of each element, by batch.
     pub(crate) quaternions: Vec<Quaternions>,
@@ -26,10 +26,12 @@ pub struct State {
     pub(crate) tracks: Vec<PoseTrack>,
     pub(crate) proxies: Vec<Proxy>,
     pub(crate) readings: Vec<ToolReading>,
-    /// How long the object has been at rest with no tool near [s].
+    /// How long the object has been at rest with no tool near \[s\].
     pub(crate) quiet_s: f64,
     pub(crate) sleeping: bool,
     pub(crate) rollbacks: u64,
+    /// Ticks since the last roll-back.
+    pub(crate) ticks_since_rollback: u64,
     /// Displacements and rotations of the last tick that passed the output gate.
     pub(crate) good_u: Vec<Node>,
     pub(crate) good_quaternions: Vec<Quaternions>,
@@ -54,6 +56,7 @@ impl State {
             quiet_s: 0.0,
             sleeping: false,
             rollbacks: 0,
+            ticks_since_rollback: u64::MAX,
             good_u: vec![[0.0; 4]; model.n_nodes()],
             good_quaternions: vec![IDENTITY; model.elements.n_batches()],
             timestep_s: model.timestep_s(),
@@ -77,6 +80,7 @@ impl State {
         self.quiet_s = other.quiet_s;
         self.sleeping = other.sleeping;
         self.rollbacks = other.rollbacks;
+        self.ticks_since_rollback = other.ticks_since_rollback;
     }
 
     /// Ticks taken since the state was made.
@@ -84,7 +88,7 @@ impl State {
         self.tick
     }
 
-    /// Simulated time [s].
+    /// Simulated time \[s\].
     pub fn sim_time_s(&self) -> f64 {
         self.tick as f64 * self.timestep_s
     }
@@ -104,22 +108,22 @@ impl State {
         self.rollbacks
     }
 
-    /// World positions of the skin, `[n_skin]` [m].
+    /// World positions of the skin, `[n_skin]` \[m\].
     pub fn write_skin(&self, model: &Model, out: &mut [[f32; 3]]) {
         model.embedding.copy_positions(&self.skin, out);
     }
 
-    /// Offsets of the skin from rest, `[n_skin]` [m].
+    /// Offsets of the skin from rest, `[n_skin]` \[m\].
     pub fn write_skin_offsets(&self, model: &Model, out: &mut [[f32; 3]]) {
         model.embedding.copy_offsets(&self.skin, out);
     }
 
-    /// Displacements in the order of the mesh's nodes, `[n_nodes]` [m].
+    /// Displacements in the order of the mesh's nodes, `[n_nodes]` \[m\].
     pub fn node_displacements(&self, model: &Model) -> Vec<Vector3<f64>> {
         in_mesh_order(model, &self.u)
     }
 
-    /// Velocities in the order of the mesh's nodes, `[n_nodes]` [m/s].
+    /// Velocities in the order of the mesh's nodes, `[n_nodes]` \[m/s\].
     pub fn node_velocities(&self, model: &Model) -> Vec<Vector3<f64>> {
         in_mesh_order(model, &self.v)
     }
@@ -135,7 +139,7 @@ impl State {
         model.embedding.apply(&self.u, &mut self.skin);
     }
 
-    /// Speed of the fastest node [m/s].
+    /// Speed of the fastest node \[m/s\].
     pub(crate) fn max_speed(&self) -> f32 {
         let squared = |n: &Node| n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
         self.v.iter().map(squared).fold(0.0, f32::max).sqrt()
@@ -187,6 +191,7 @@ impl Clone for State {
             quiet_s: self.quiet_s,
             sleeping: self.sleeping,
             rollbacks: self.rollbacks,
+            ticks_since_rollback: self.ticks_since_rollback,
             good_u: self.good_u.clone(),
             good_quaternions: self.good_quaternions.clone(),
             timestep_s: self.timestep_s,

@@ -1,4 +1,4 @@
-//! One implicit step of the coarse object, with its tools and supports [MG04].
+//! One implicit step of the coarse object, with its tools and supports \[MG04\].
 //!
 //! `A dv = r`, `A = M (1 + h alpha) + h^2 K(R)`, `r = h f(x + h v) + h M (g - alpha v)`; contact adds rows to `A` and `r`
 //! (see [`crate::contact`]), and two or three passes find which rows push and which slide.
@@ -24,6 +24,10 @@ const FREE_PASSES: u32 = 4;
 const MAX_PASSES: u32 = 12;
 /// A solve may leave this share of the contact impulse as residual.
 const IMPULSE_TOLERANCE: f32 = 1e-4;
+/// A multiplier may grow to what presses its skin point this many cells deep.
+const MAX_PRESS_CELLS: f32 = 4.0;
+/// One step sets out to resolve no more penetration than this share of a cell.
+const MAX_CORRECTION_CELLS: f32 = 0.1;
 /// Contacts are looked for no farther than this many cells away.
 const MAX_REACH_CELLS: f32 = 2.0;
 
@@ -149,7 +153,9 @@ fn find_contacts(model: &Model, state: &State, workspace: &mut Workspace, report
             max_contacts: model.max_contacts(body),
             spacing: 0.35 * model.cell_size,
             dt: model.dt,
-            inverse_mass: &model.surface.inverse_mass,
+            max_correction: MAX_CORRECTION_CELLS * model.cell_size,
+            max_press: MAX_PRESS_CELLS * model.cell_size,
+            surface: &model.surface,
             old: &state.contacts,
         };
         let first_row = workspace.rows.rows.len();
@@ -177,7 +183,7 @@ fn predict_rows(model: &Model, rows: &mut Rows, motions: &[ProxyMotion]) {
     }
     for index in 0..rows.rows.len() {
         let row = &rows.rows[index];
-        let yields = row.inverse_mass.max(model.inverse_mass_floor);
+        let yields = row.inverse_mass;
         let crowd = rows.crowding(index, model.cell_size);
         rows.rows[index].stiffness = kappa / (h * h * yields * crowd);
         predict_secant(&mut rows.rows[index]);

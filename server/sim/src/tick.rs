@@ -7,6 +7,7 @@ use crate::description::Coupling;
 use crate::model::Model;
 use crate::probe::{Probe, Stage};
 use crate::report::TickReport;
+use crate::rotation::IDENTITY;
 use crate::state::State;
 use crate::step::{move_tools_freely, step};
 use crate::workspace::Workspace;
@@ -88,6 +89,9 @@ fn any_tool_is_near(model: &Model, state: &State, workspace: &mut Workspace) -> 
     })
 }
 
+/// A second roll-back within this many ticks means that the last good state is none: the object returns to its rest shape.
+const RELAPSE_TICKS: u64 = 50;
+
 /// Output gate: a state that is not finite, or that has left the scene, is replaced by the last good one, at rest.
 fn gate_output(model: &Model, state: &mut State, workspace: &mut Workspace, report: &mut TickReport) {
     let limit = MAX_DISPLACEMENT * model.size;
@@ -96,10 +100,16 @@ fn gate_output(model: &Model, state: &mut State, workspace: &mut Workspace, repo
     if state.u.iter().all(is_good) && state.v.iter().all(is_finite) && state.proxies_are_finite() {
         state.good_u.copy_from_slice(&state.u);
         state.good_quaternions.copy_from_slice(&state.quaternions);
+        state.ticks_since_rollback = state.ticks_since_rollback.saturating_add(1);
         return;
     }
     report.rolled_back = true;
     state.rollbacks += 1;
+    if state.ticks_since_rollback < RELAPSE_TICKS {
+        state.good_u.fill([0.0; 4]);
+        state.good_quaternions.fill(IDENTITY);
+    }
+    state.ticks_since_rollback = 0;
     state.u.copy_from_slice(&state.good_u);
     state.quaternions.copy_from_slice(&state.good_quaternions);
     state.v.fill([0.0; 4]);

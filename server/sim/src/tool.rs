@@ -9,11 +9,11 @@ use crate::description::{Sampling, ToolDescription};
 pub struct PoseSample {
     /// Sequence number of its source.
     pub sequence: u64,
-    /// Time on its source's clock [ns].
+    /// Time on its source's clock \[ns\].
     pub source_time_ns: u64,
     /// Whether the tracker saw the marker; an invalid sample is no news.
     pub valid: bool,
-    /// `tracker <- marker` [m].
+    /// `tracker <- marker` \[m\].
     pub pose: Isometry3<f64>,
 }
 
@@ -42,7 +42,7 @@ struct Arrived {
 pub(crate) struct PoseTrack {
     ring: [Option<Arrived>; RING],
     newest: usize,
-    /// Smallest `arrival - source time` seen [s].
+    /// Smallest `arrival - source time` seen \[s\].
     clock_offset_s: f64,
     target: Option<Target>,
     pub(crate) sequence: u64,
@@ -97,7 +97,7 @@ impl PoseTrack {
         true
     }
 
-    /// Age of the newest sample [s]; infinite if there was none.
+    /// Age of the newest sample \[s\]; infinite if there was none.
     pub(crate) fn age_s(&self, clock_s: f64) -> f64 {
         self.ring[self.newest].map_or(f64::INFINITY, |a| clock_s - a.arrival_s)
     }

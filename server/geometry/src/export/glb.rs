@@ -24,58 +24,27 @@ const Y_UP_FROM_Z_UP: [f32; 4] = [-FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2];
 ///
 /// # Panics
 /// If `normals` and `positions` differ in number, or the file would exceed 4 GiB.
-pub fn glb_bytes(
-    positions: &[[f32; 3]],
-    normals: &[[f32; 3]],
-    triangles: &[[VertexIdx; 3]],
-) -> Vec<u8> {
+pub fn glb_bytes(positions: &[[f32; 3]], normals: &[[f32; 3]], triangles: &[[VertexIdx; 3]]) -> Vec<u8> {
     assert_eq!(positions.len(), normals.len(), "one normal per vertex");
     let mut binary = Vec::new();
     let mut root = Root::default();
     root.asset.generator = Some("Plica".to_owned());
-    let position_view = push_view(
-        &mut root,
-        &mut binary,
-        floats(positions),
-        Target::ArrayBuffer,
-    );
+    let position_view = push_view(&mut root, &mut binary, floats(positions), Target::ArrayBuffer);
     let normal_view = push_view(&mut root, &mut binary, floats(normals), Target::ArrayBuffer);
     let index_bytes = triangles.iter().flatten().flat_map(|v| v.0.to_le_bytes());
-    let index_view = push_view(
-        &mut root,
-        &mut binary,
-        index_bytes,
-        Target::ElementArrayBuffer,
-    );
+    let index_view = push_view(&mut root, &mut binary, index_bytes, Target::ElementArrayBuffer);
 
     let [min, max] = bounds(positions);
     let position = root.push(Accessor {
         min: Some(Value::from(min)),
         max: Some(Value::from(max)),
-        ..accessor(
-            position_view,
-            positions.len(),
-            ComponentType::F32,
-            Type::Vec3,
-        )
+        ..accessor(position_view, positions.len(), ComponentType::F32, Type::Vec3)
     });
-    let normal = root.push(accessor(
-        normal_view,
-        normals.len(),
-        ComponentType::F32,
-        Type::Vec3,
-    ));
-    let indices = root.push(accessor(
-        index_view,
-        3 * triangles.len(),
-        ComponentType::U32,
-        Type::Scalar,
-    ));
+    let normal = root.push(accessor(normal_view, normals.len(), ComponentType::F32, Type::Vec3));
+    let indices = root.push(accessor(index_view, 3 * triangles.len(), ComponentType::U32, Type::Scalar));
     push_scene(&mut root, position, normal, indices);
     root.push(buffer(binary.len()));
-    let json = root
-        .to_vec()
-        .expect("a document of numbers and names can always be written as JSON");
+    let json = root.to_vec().expect("a document of numbers and names can always be written as JSON");
     container(json, binary)
 }
 
@@ -97,12 +66,7 @@ fn floats(vectors: &[[f32; 3]]) -> impl Iterator<Item = u8> + '_ {
 }
 
 /// Appends bytes to the binary part, as one buffer view. All values have 4 bytes, so views stay aligned.
-fn push_view(
-    root: &mut Root,
-    binary: &mut Vec<u8>,
-    bytes: impl Iterator<Item = u8>,
-    target: Target,
-) -> Index<View> {
+fn push_view(root: &mut Root, binary: &mut Vec<u8>, bytes: impl Iterator<Item = u8>, target: Target) -> Index<View> {
     let byte_offset = binary.len();
     binary.extend(bytes);
     root.push(View {
@@ -135,41 +99,21 @@ fn accessor(view: Index<View>, count: usize, component: ComponentType, type_: Ty
 }
 
 fn buffer(byte_length: usize) -> Buffer {
-    Buffer {
-        byte_length: byte_length.into(),
-        name: None,
-        uri: None,
-        extensions: None,
-        extras: Default::default(),
-    }
+    Buffer { byte_length: byte_length.into(), name: None, uri: None, extensions: None, extras: Default::default() }
 }
 
 /// Least and greatest coordinates; both zero for no vertices.
 fn bounds(positions: &[[f32; 3]]) -> [[f32; 3]; 2] {
     let first = positions.first().copied().unwrap_or_default();
     let fold = |pick: fn(f32, f32) -> f32| {
-        positions.iter().fold(first, |bound, x| {
-            [
-                pick(bound[0], x[0]),
-                pick(bound[1], x[1]),
-                pick(bound[2], x[2]),
-            ]
-        })
+        positions.iter().fold(first, |bound, x| [pick(bound[0], x[0]), pick(bound[1], x[1]), pick(bound[2], x[2])])
     };
     [fold(f32::min), fold(f32::max)]
 }
 
 /// Scene -> `world_z_up` (turned) -> `skin` (the mesh).
-fn push_scene(
-    root: &mut Root,
-    position: Index<Accessor>,
-    normal: Index<Accessor>,
-    indices: Index<Accessor>,
-) {
-    let attributes = [
-        (Valid(Semantic::Positions), position),
-        (Valid(Semantic::Normals), normal),
-    ];
+fn push_scene(root: &mut Root, position: Index<Accessor>, normal: Index<Accessor>, indices: Index<Accessor>) {
+    let attributes = [(Valid(Semantic::Positions), position), (Valid(Semantic::Normals), normal)];
     let primitive = Primitive {
         attributes: attributes.into(),
         extensions: None,
@@ -188,23 +132,14 @@ fn push_scene(
         weights: None,
     };
     let mesh = root.push(mesh);
-    let skin = root.push(Node {
-        mesh: Some(mesh),
-        name,
-        ..Node::default()
-    });
+    let skin = root.push(Node { mesh: Some(mesh), name, ..Node::default() });
     let world = root.push(Node {
         children: Some(vec![skin]),
         rotation: Some(UnitQuaternion(Y_UP_FROM_Z_UP)),
         name: Some("world_z_up".to_owned()),
         ..Node::default()
     });
-    let scene = Scene {
-        extensions: None,
-        extras: Default::default(),
-        name: None,
-        nodes: vec![world],
-    };
+    let scene = Scene { extensions: None, extras: Default::default(), name: None, nodes: vec![world] };
     root.scene = Some(root.push(scene));
 }
 
@@ -225,7 +160,5 @@ fn container(mut json: Vec<u8>, binary: Vec<u8>) -> Vec<u8> {
 }
 
 fn chunk_length(length: usize) -> [u8; 4] {
-    u32::try_from(length)
-        .expect("a GLB file holds at most 4 GiB")
-        .to_le_bytes()
+    u32::try_from(length).expect("a GLB file holds at most 4 GiB").to_le_bytes()
 }

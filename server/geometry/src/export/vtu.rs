@@ -4,8 +4,7 @@ use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
 use vtkio::model::{
-    Attribute, Attributes, ByteOrder, CellType, Cells, DataSet, UnstructuredGridPiece, Version,
-    VertexNumbers,
+    Attribute, Attributes, ByteOrder, CellType, Cells, DataSet, UnstructuredGridPiece, Version, VertexNumbers,
 };
 use vtkio::{IOBuffer, Vtk};
 
@@ -50,27 +49,16 @@ impl PointField<'_> {
 ///
 /// # Errors
 /// [`ExportError`]: a field of another length than the mesh's nodes, or a file that cannot be written.
-pub fn write_vtu(
-    path: &Path,
-    mesh: &HexMesh,
-    fields: &[PointField<'_>],
-) -> Result<(), ExportError> {
+pub fn write_vtu(path: &Path, mesh: &HexMesh, fields: &[PointField<'_>]) -> Result<(), ExportError> {
     let n_nodes = mesh.n_nodes();
     if let Some(field) = fields.iter().find(|field| field.n_values() != n_nodes) {
         let (name, n_values) = (field.name().to_owned(), field.n_values());
-        return Err(ExportError::FieldLength {
-            name,
-            n_values,
-            n_nodes,
-        });
+        return Err(ExportError::FieldLength { name, n_values, n_nodes });
     }
     let piece = UnstructuredGridPiece {
         points: flat_points(mesh.nodes()),
         cells: cells(mesh),
-        data: Attributes {
-            point: fields.iter().map(|field| field.to_attribute()).collect(),
-            cell: Vec::new(),
-        },
+        data: Attributes { point: fields.iter().map(|field| field.to_attribute()).collect(), cell: Vec::new() },
     };
     let vtk = Vtk {
         version: Version::new((1, 0)),
@@ -80,8 +68,7 @@ pub fn write_vtu(
         file_path: None,
     };
     let mut bytes = Vec::new();
-    vtk.write_xml(&mut bytes)
-        .map_err(|error| ExportError::Vtk(error.to_string()))?;
+    vtk.write_xml(&mut bytes).map_err(|error| ExportError::Vtk(error.to_string()))?;
     write_file(path, &bytes)
 }
 
@@ -90,18 +77,10 @@ fn flat_points(points: &[Point3<f64>]) -> IOBuffer {
 }
 
 fn cells(mesh: &HexMesh) -> Cells {
-    let connectivity = mesh
-        .hexes()
-        .iter()
-        .flatten()
-        .map(|node| u64::from(node.0))
-        .collect();
+    let connectivity = mesh.hexes().iter().flatten().map(|node| u64::from(node.0)).collect();
     let offsets = (1..=mesh.n_hexes() as u64).map(|n| 8 * n).collect();
     Cells {
-        cell_verts: VertexNumbers::XML {
-            connectivity,
-            offsets,
-        },
+        cell_verts: VertexNumbers::XML { connectivity, offsets },
         types: vec![CellType::Hexahedron; mesh.n_hexes()],
     }
 }

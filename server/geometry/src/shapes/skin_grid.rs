@@ -33,10 +33,7 @@ pub fn block_skin(size_m: [f64; 3], spacing_m: f64) -> Skin {
 /// If a size or the spacing is not positive and finite.
 pub fn wedge_skin(wedge: &Wedge, spacing_m: f64) -> Skin {
     wedge.check();
-    assert!(
-        spacing_m.is_finite() && spacing_m > 0.0,
-        "the spacing must be positive and finite, it is {spacing_m} m"
-    );
+    assert!(spacing_m.is_finite() && spacing_m > 0.0, "the spacing must be positive and finite, it is {spacing_m} m");
     let grid = SkinGrid::new(wedge, spacing_m);
     let mut triangles = grid.top_triangles();
     triangles.extend(grid.wall_triangles());
@@ -56,13 +53,9 @@ struct SkinGrid {
 impl SkinGrid {
     fn new(wedge: &Wedge, spacing_m: f64) -> Self {
         let cells = |spacing: f64, least: usize| {
-            [wedge.length_m, wedge.width_m]
-                .map(|size| ((size / spacing).round() as usize).max(least))
+            [wedge.length_m, wedge.width_m].map(|size| ((size / spacing).round() as usize).max(least))
         };
-        Self {
-            top: cells(spacing_m, 1),
-            bottom: cells(BOTTOM_COARSENING * spacing_m, 2),
-        }
+        Self { top: cells(spacing_m, 1), bottom: cells(BOTTOM_COARSENING * spacing_m, 2) }
     }
 
     fn n_rim(&self) -> usize {
@@ -96,19 +89,13 @@ impl SkinGrid {
     /// Vertices inside the bottom: `i` and `j` run from 1 to the number of cells less 1.
     fn bottom_vertex(&self, [i, j]: [usize; 2]) -> VertexIdx {
         let n_top = (self.top[0] + 1) * (self.top[1] + 1);
-        VertexIdx::from_index(
-            n_top + N_WALL_ROWS * self.n_rim() + (i - 1) + (self.bottom[0] - 1) * (j - 1),
-        )
+        VertexIdx::from_index(n_top + N_WALL_ROWS * self.n_rim() + (i - 1) + (self.bottom[0] - 1) * (j - 1))
     }
 
     fn positions(&self, wedge: &Wedge) -> Vec<Point3<f64>> {
         let at = |[i, j]: [usize; 2], [n_x, n_y]: [usize; 2], height_share: f64| {
             let x = wedge.length_m * (i as f64 / n_x as f64);
-            Point3::new(
-                x,
-                wedge.width_m * (j as f64 / n_y as f64),
-                wedge.height_m(x) * height_share,
-            )
+            Point3::new(x, wedge.width_m * (j as f64 / n_y as f64), wedge.height_m(x) * height_share)
         };
         let [n_x, n_y] = self.top;
         let top = lattice([n_x + 1, n_y + 1, 1]).map(|[i, j, _]| at([i, j], self.top, 1.0));
@@ -149,61 +136,32 @@ impl SkinGrid {
     /// The strip between the walls' lowest row and the inside of the bottom, side by side.
     fn zipper_triangles(&self, positions: &[Point3<f64>]) -> Vec<[VertexIdx; 3]> {
         let ([n_x, n_y], [b_x, b_y]) = (self.top, self.bottom);
-        let outer = |first: usize, n: usize| {
-            (first..=first + n)
-                .map(|m| self.wall_vertex(m, N_WALL_ROWS))
-                .collect()
-        };
-        let inner =
-            |path: Vec<[usize; 2]>| path.into_iter().map(|at| self.bottom_vertex(at)).collect();
+        let outer = |first: usize, n: usize| (first..=first + n).map(|m| self.wall_vertex(m, N_WALL_ROWS)).collect();
+        let inner = |path: Vec<[usize; 2]>| path.into_iter().map(|at| self.bottom_vertex(at)).collect();
         let sides: [(Vec<VertexIdx>, Vec<VertexIdx>); 4] = [
             (outer(0, n_x), inner((1..b_x).map(|i| [i, 1]).collect())),
-            (
-                outer(n_x, n_y),
-                inner((1..b_y).map(|j| [b_x - 1, j]).collect()),
-            ),
-            (
-                outer(n_x + n_y, n_x),
-                inner((1..b_x).rev().map(|i| [i, b_y - 1]).collect()),
-            ),
-            (
-                outer(2 * n_x + n_y, n_y),
-                inner((1..b_y).rev().map(|j| [1, j]).collect()),
-            ),
+            (outer(n_x, n_y), inner((1..b_y).map(|j| [b_x - 1, j]).collect())),
+            (outer(n_x + n_y, n_x), inner((1..b_x).rev().map(|i| [i, b_y - 1]).collect())),
+            (outer(2 * n_x + n_y, n_y), inner((1..b_y).rev().map(|j| [1, j]).collect())),
         ];
-        sides
-            .iter()
-            .flat_map(|(outer, inner)| zip_down(positions, outer, inner))
-            .collect()
+        sides.iter().flat_map(|(outer, inner)| zip_down(positions, outer, inner)).collect()
     }
 }
 
 /// A quad, counter-clockwise seen from outside, as two triangles; the diagonal alternates with `parity`.
 fn cut([a, b, c, d]: [VertexIdx; 4], parity: usize) -> [[VertexIdx; 3]; 2] {
-    if parity.is_multiple_of(2) {
-        [[a, b, c], [a, c, d]]
-    } else {
-        [[a, b, d], [b, c, d]]
-    }
+    if parity.is_multiple_of(2) { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
 }
 
 /// Triangles, facing down, between two parallel lines of vertices; the inner one lies left of the outer one seen
 /// from above. Always takes the shorter of the two next diagonals.
-fn zip_down(
-    positions: &[Point3<f64>],
-    outer: &[VertexIdx],
-    inner: &[VertexIdx],
-) -> Vec<[VertexIdx; 3]> {
+fn zip_down(positions: &[Point3<f64>], outer: &[VertexIdx], inner: &[VertexIdx]) -> Vec<[VertexIdx; 3]> {
     let length = |a: VertexIdx, b: VertexIdx| (positions[a.index()] - positions[b.index()]).norm();
     let (mut i, mut j) = (0, 0);
     let mut triangles = Vec::with_capacity(outer.len() + inner.len());
     while i + 1 < outer.len() || j + 1 < inner.len() {
-        let along_outer = outer
-            .get(i + 1)
-            .map_or(f64::INFINITY, |&next| length(next, inner[j]));
-        let along_inner = inner
-            .get(j + 1)
-            .map_or(f64::INFINITY, |&next| length(outer[i], next));
+        let along_outer = outer.get(i + 1).map_or(f64::INFINITY, |&next| length(next, inner[j]));
+        let along_inner = inner.get(j + 1).map_or(f64::INFINITY, |&next| length(outer[i], next));
         if along_outer <= along_inner {
             triangles.push([outer[i + 1], outer[i], inner[j]]);
             i += 1;

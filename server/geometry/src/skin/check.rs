@@ -56,9 +56,7 @@ pub enum SkinError {
         n_backward: usize,
     },
     /// The triangles at a vertex form no single fan: none at all, or surfaces that touch in a point.
-    #[error(
-        "the {n_triangles} triangles at vertex {vertex} form no single fan (one closed fan has {n_in_fan})"
-    )]
+    #[error("the {n_triangles} triangles at vertex {vertex} form no single fan (one closed fan has {n_in_fan})")]
     Vertex {
         /// The vertex.
         vertex: VertexIdx,
@@ -81,25 +79,14 @@ impl Skin {
         if self.triangles.is_empty() {
             return Err(SkinError::Empty { n_vertices });
         }
-        if let Some(v) = self
-            .positions
-            .iter()
-            .position(|x| x.iter().any(|c| !c.is_finite()))
-        {
+        if let Some(v) = self.positions.iter().position(|x| x.iter().any(|c| !c.is_finite())) {
             let position = self.positions[v].coords.into();
-            return Err(SkinError::NonFinite {
-                vertex: VertexIdx::from_index(v),
-                position,
-            });
+            return Err(SkinError::NonFinite { vertex: VertexIdx::from_index(v), position });
         }
         for (t, corners) in self.triangles.iter().enumerate() {
             let triangle = TriangleIdx::from_index(t);
             if let Some(&vertex) = corners.iter().find(|v| v.index() >= n_vertices) {
-                return Err(SkinError::VertexOutOfRange {
-                    triangle,
-                    vertex,
-                    n_vertices,
-                });
+                return Err(SkinError::VertexOutOfRange { triangle, vertex, n_vertices });
             }
             let area = area_vector(&self.corner_positions(triangle)).norm();
             let has_area = area > 0.0;
@@ -111,8 +98,7 @@ impl Skin {
     }
 
     pub(super) fn check_manifold(&self) -> Result<(), SkinError> {
-        let mut counts: HashMap<[VertexIdx; 2], usize> =
-            HashMap::with_capacity(3 * self.n_triangles());
+        let mut counts: HashMap<[VertexIdx; 2], usize> = HashMap::with_capacity(3 * self.n_triangles());
         for edge in self.triangles.iter().flat_map(|&t| triangle_edges(t)) {
             *counts.entry(edge).or_insert(0) += 1;
         }
@@ -120,12 +106,7 @@ impl Skin {
         for [from, to] in self.triangles.iter().flat_map(|&t| triangle_edges(t)) {
             let (n_forward, n_backward) = (count([from, to]), count([to, from]));
             if (n_forward, n_backward) != (1, 1) {
-                return Err(SkinError::Edge {
-                    from,
-                    to,
-                    n_forward,
-                    n_backward,
-                });
+                return Err(SkinError::Edge { from, to, n_forward, n_backward });
             }
         }
         self.check_fans()
@@ -147,27 +128,14 @@ impl Skin {
             let vertex = VertexIdx::from_index(i);
             let n_in_fan = start.map_or(0, |start| fan_length(&next_around, vertex, start));
             if n_triangles == 0 || n_in_fan != n_triangles {
-                return Err(SkinError::Vertex {
-                    vertex,
-                    n_triangles,
-                    n_in_fan,
-                });
+                return Err(SkinError::Vertex { vertex, n_triangles, n_in_fan });
             }
         }
         Ok(())
     }
 }
 
-fn fan_length(
-    next_around: &HashMap<[VertexIdx; 2], VertexIdx>,
-    vertex: VertexIdx,
-    start: VertexIdx,
-) -> usize {
-    let turn = |&at: &VertexIdx| {
-        next_around
-            .get(&[vertex, at])
-            .copied()
-            .filter(|&next| next != start)
-    };
+fn fan_length(next_around: &HashMap<[VertexIdx; 2], VertexIdx>, vertex: VertexIdx, start: VertexIdx) -> usize {
+    let turn = |&at: &VertexIdx| next_around.get(&[vertex, at]).copied().filter(|&next| next != start);
     std::iter::successors(Some(start), turn).count()
 }

@@ -2,9 +2,7 @@
 #![allow(dead_code, reason = "every test file uses its own part")]
 
 use nalgebra::{Point3, Vector3};
-use plica_geometry::shapes::{
-    WEDGE_DIVISIONS, WEDGE_SKIN_SPACING_M, Wedge, block, wedge, wedge_skin,
-};
+use plica_geometry::shapes::{WEDGE_DIVISIONS, WEDGE_SKIN_SPACING_M, Wedge, block, wedge, wedge_skin};
 use plica_geometry::{HexIdx, HexMesh, NodeIdx, Skin};
 
 pub(crate) const SPACING_M: f64 = WEDGE_SKIN_SPACING_M;
@@ -29,26 +27,18 @@ pub(crate) fn distorted_block() -> HexMesh {
 /// missing above the first layer (z > 10 mm).
 pub(crate) fn u_shape() -> HexMesh {
     let full = block([0.05, 0.02, 0.06], [5, 2, 6]);
-    keep_cells(&full, |centre| {
-        !(centre.x > 0.02 && centre.x < 0.03 && centre.z > 0.01)
-    })
+    keep_cells(&full, |centre| !(centre.x > 0.02 && centre.x < 0.03 && centre.z > 0.01))
 }
 
 pub(crate) fn centre(mesh: &HexMesh, hex: HexIdx) -> Point3<f64> {
-    let sum = mesh
-        .corner_positions(hex)
-        .iter()
-        .fold(Vector3::zeros(), |sum, x| sum + x.coords);
+    let sum = mesh.corner_positions(hex).iter().fold(Vector3::zeros(), |sum, x| sum + x.coords);
     Point3::from(sum / 8.0)
 }
 
 /// The hexahedra whose centre `keep` accepts, with the nodes they use.
 fn keep_cells(mesh: &HexMesh, keep: impl Fn(Point3<f64>) -> bool) -> HexMesh {
-    let kept: Vec<_> = mesh
-        .hex_indices()
-        .filter(|&hex| keep(centre(mesh, hex)))
-        .map(|hex| mesh.hexes()[hex.index()])
-        .collect();
+    let kept: Vec<_> =
+        mesh.hex_indices().filter(|&hex| keep(centre(mesh, hex))).map(|hex| mesh.hexes()[hex.index()]).collect();
     let mut used: Vec<NodeIdx> = kept.iter().flatten().copied().collect();
     used.sort_unstable();
     used.dedup();
@@ -63,10 +53,7 @@ pub(crate) struct Random(pub u64);
 impl Random {
     /// In [-1, 1).
     pub(crate) fn number(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 

@@ -27,11 +27,11 @@ pub(crate) struct Candidate {
     /// Skin vertices that carry the point, with weights; unused ones have weight 0.
     pub(crate) vertices: [u32; 3],
     pub(crate) weights: [f32; 3],
-    /// The point [m].
+    /// The point \[m\].
     pub(crate) point: V3,
     /// Unit normal from the body to the skin.
     pub(crate) normal: V3,
-    /// Signed distance [m].
+    /// Signed distance \[m\].
     pub(crate) gap: f32,
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Augmented Lagrangian, `u` the displacement of the skin against the tool in this step, `T = I - n n^T`:
 //! `f_n = lambda_n - k (g + n . u)` and, with the trial force `t = lambda_t - k (s + T u)`, `f_t = beta t`,
-//! `beta = min(1, mu f_n / |t|)`: radial return onto the cone [SH98, ch. 2], whose secant `beta` is fixed within a pass.
+//! `beta = min(1, mu f_n / |t|)`: radial return onto the cone \[SH98, ch. 2\], whose secant `beta` is fixed within a pass.
 //! A row sticks while `beta = 1`. Inside the linear solve `f_n` is not cut at zero; a row that pulls is switched off and
 //! the solve goes on without it.
 
@@ -15,13 +15,13 @@ const STICK_MARGIN: f32 = 1.02;
 const CONE_TOLERANCE: f32 = 0.02;
 
 impl Row {
-    /// Tangential stiffness of the present state [N/m].
+    /// Tangential stiffness of the present state \[N/m\].
     #[inline(always)]
     fn tangential_stiffness(&self) -> f32 {
         if self.friction > 0.0 { self.contact.secant * self.stiffness } else { 0.0 }
     }
 
-    /// `D = -df/du = k n n^T + beta k T` [N/m].
+    /// `D = -df/du = k n n^T + beta k T` \[N/m\].
     #[inline(always)]
     pub(crate) fn stiffness_matrix(&self) -> M3 {
         let n = self.contact.normal;
@@ -29,20 +29,20 @@ impl Row {
         M3::identity() * t + n * n.transpose() * (self.stiffness - t)
     }
 
-    /// `f_n` at the present `u` [N].
+    /// `f_n` at the present `u` \[N\].
     #[inline(always)]
     pub(crate) fn normal_force(&self) -> f32 {
         self.contact.normal_force - self.stiffness * (self.gap + self.contact.normal.dot(&self.u))
     }
 
-    /// `t = lambda_t - k (s + T u)` at the present `u` [N].
+    /// `t = lambda_t - k (s + T u)` at the present `u` \[N\].
     #[inline(always)]
     fn trial_friction(&self) -> V3 {
         let c = &self.contact;
         c.tangential_force - (c.slip + tangent(&c.normal, &self.u)) * self.stiffness
     }
 
-    /// Force on the skin at the present `u` under the present law [N]; zero if the row is off.
+    /// Force on the skin at the present `u` under the present law \[N\]; zero if the row is off.
     #[inline(always)]
     fn law(&self) -> V3 {
         if !self.active {
@@ -83,7 +83,7 @@ pub(crate) fn evaluate(rows: &mut Rows, may_activate: bool) -> bool {
     changed || off_cone > CONE_TOLERANCE * cone
 }
 
-/// A new secant of the radial return. Returns how far the force of the last pass is off what the new state asks for [N].
+/// A new secant of the radial return. Returns how far the force of the last pass is off what the new state asks for \[N\].
 fn adapt_friction(row: &mut Row, normal_force: f32, may_rise: bool) -> f32 {
     let limit = row.friction * normal_force;
     let trial = row.trial_friction().norm();
@@ -106,6 +106,9 @@ pub(crate) fn predict_secant(row: &mut Row) {
 }
 
 /// Carries the multipliers over to the next tick. `relaxation` in (0, 1]; `bias_decay` is the share of the bias that stays.
+///
+/// A multiplier is bounded by the row's `max_force`: a tool that is forced where the object cannot go (through a fixed
+/// node, say) would otherwise wind it up without end, and fling the object when it comes free.
 pub(crate) fn settle(row: &mut Row, relaxation: f32, bias_decay: f32) {
     let normal_force = if row.active { row.normal_force() } else { 0.0 };
     let tu = tangent(&row.contact.normal, &row.u);
@@ -119,7 +122,8 @@ pub(crate) fn settle(row: &mut Row, relaxation: f32, bias_decay: f32) {
         (c.normal_force, c.tangential_force, c.slip, c.secant) = (0.0, V3::zeros(), V3::zeros(), 1.0);
         return;
     }
-    c.normal_force += relaxation * (normal_force - c.normal_force);
+    let bound = row.max_force;
+    c.normal_force = (c.normal_force + relaxation * (normal_force - c.normal_force)).min(bound);
     c.tangential_force = force * (limit / force.norm().max(1e-30)).min(1.0);
     c.slip = if c.slides() { V3::zeros() } else { c.slip + tu };
 }

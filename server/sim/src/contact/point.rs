@@ -6,10 +6,10 @@
 use super::{Detector, Placement, SkinSurface, Solid, V3};
 use crate::embedding::SkinPositions;
 
-/// Gap at which a vertex no longer counts as touching [m].
+/// Gap at which a vertex no longer counts as touching \[m\].
 const BAND: f32 = 1e-3;
 
-/// A contact point, deformed and on the reference skin [m].
+/// A contact point, deformed and on the reference skin \[m\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ContactPoint {
     pub(crate) deformed: V3,
@@ -67,7 +67,7 @@ fn tip_distance(solid: &Solid) -> f32 {
     }
 }
 
-/// Parameter and barycentric weights where the line meets the triangle [MT97].
+/// Parameter and barycentric weights where the line meets the triangle \[MT97\].
 fn line_hits(origin: &V3, direction: &V3, [a, b, c]: &[V3; 3]) -> Option<(f32, [f32; 3])> {
     let (ab, ac) = (b - a, c - a);
     let p = direction.cross(&ac);

@@ -11,17 +11,17 @@ use super::{Rows, V3};
 use crate::description::{Coupling, SpringCoupling, ToolDescription};
 use crate::tool::Target;
 
-/// Time constant of the device velocity that the damper sees [s].
+/// Time constant of the device velocity that the damper sees \[s\].
 const DEVICE_VELOCITY_FILTER_S: f64 = 5e-3;
 
 /// The simulated tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Proxy {
     pub(crate) pose: Isometry3<f64>,
-    /// `(v, l omega)` [m/s].
+    /// `(v, l omega)` \[m/s\].
     pub(crate) twist: Vector6<f64>,
     device_twist: Vector6<f64>,
-    /// Force and torque/l of the coupling on the proxy [N].
+    /// Force and torque/l of the coupling on the proxy \[N\].
     pub(crate) coupling_force: Vector6<f64>,
     pub(crate) saturated: bool,
     pub(crate) present: bool,
@@ -212,7 +212,7 @@ fn jacobian(arm: &V3, lever: f32) -> nalgebra::Matrix3x6<f32> {
     )
 }
 
-/// From `from` to `to`: translation and lever times rotation vector, world axes [m].
+/// From `from` to `to`: translation and lever times rotation vector, world axes \[m\].
 fn pose_error(to: &Isometry3<f64>, from: &Isometry3<f64>, lever: f64) -> Vector6<f64> {
     let shift = to.translation.vector - from.translation.vector;
     let turn = (to.rotation * from.rotation.inverse()).scaled_axis() * lever;

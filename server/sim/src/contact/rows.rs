@@ -1,6 +1,6 @@
 //! Constraint rows: which candidates become rows, and what they inherit from the contacts of the last tick.
 
-use super::{Candidate, V3};
+use super::{Candidate, SkinSurface, V3};
 use crate::embedding::SkinEmbedding;
 use crate::lanes::Node;
 
@@ -10,20 +10,20 @@ pub(crate) struct Contact {
     /// Tool index, or `n_tools + plane index`.
     pub(crate) body: u32,
     pub(crate) feature: u64,
-    /// Multipliers: normal force and tangential force on the skin [N].
+    /// Multipliers: normal force and tangential force on the skin \[N\].
     pub(crate) normal_force: f32,
     pub(crate) tangential_force: V3,
-    /// Tangential displacement since it sticks [m].
+    /// Tangential displacement since it sticks \[m\].
     pub(crate) slip: V3,
     /// Secant of the friction cone, `min(1, mu f_n / |t|)`: 1 sticks, less slides, 0 is to be predicted.
     pub(crate) secant: f32,
-    /// Penetration that was there when it began, fading out [m]; never positive.
+    /// Penetration that was there when it began, fading out \[m\]; never positive.
     pub(crate) bias: f32,
     pub(crate) point: V3,
     pub(crate) normal: V3,
-    /// Gap at the end of the tick [m].
+    /// Gap at the end of the tick \[m\].
     pub(crate) gap: f32,
-    /// Forces of the last solve, for reports [N].
+    /// Forces of the last solve, for reports \[N\].
     pub(crate) force: V3,
 }
 
@@ -38,23 +38,25 @@ impl Contact {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Row {
     pub(crate) contact: Contact,
-    /// From the tool's origin to the point [m].
+    /// From the tool's origin to the point \[m\].
     pub(crate) arm: V3,
-    /// Gap that the solve closes: measured gap less bias [m].
+    /// Gap that the solve closes: measured gap less bias, bounded below \[m\].
     pub(crate) gap: f32,
-    /// Normal and sticking stiffness of the augmented Lagrangian [N/m].
+    /// Normal and sticking stiffness of the augmented Lagrangian \[N/m\].
     pub(crate) stiffness: f32,
     pub(crate) friction: f32,
-    /// `tr(J A_0^-1 J^T) / 3` at the point [1/kg].
+    /// `tr(J A_0^-1 J^T) / 3` at the point \[1/kg\].
     pub(crate) inverse_mass: f32,
+    /// Bound of the normal multiplier \[N\].
+    pub(crate) max_force: f32,
     pub(crate) active: bool,
-    /// Velocity of the skin point before the solve [m/s].
+    /// Velocity of the skin point before the solve \[m/s\].
     pub(crate) skin_velocity: V3,
-    /// Displacement of the skin against the tool in this step [m].
+    /// Displacement of the skin against the tool in this step \[m\].
     pub(crate) u: V3,
-    /// `J dv` of the last pass [m/s].
+    /// `J dv` of the last pass \[m/s\].
     pub(crate) jdv: V3,
-    /// Force on the skin [N].
+    /// Force on the skin \[N\].
     pub(crate) force: V3,
     first_entry: u32,
     last_entry: u32,
@@ -73,7 +75,7 @@ pub(crate) struct Rows {
 
 #[derive(Debug, Clone, Copy)]
 struct Ranked {
-    /// Normal force of the old contact [N].
+    /// Normal force of the old contact \[N\].
     load: f32,
     predicted_gap: f32,
     candidate: u32,
@@ -88,16 +90,19 @@ pub(crate) struct Selection<'a> {
     pub(crate) origin: V3,
     pub(crate) activation_gap: f32,
     pub(crate) max_contacts: usize,
-    /// Distance that rows keep when there are too many [m].
+    /// Distance that rows keep when there are too many \[m\].
     pub(crate) spacing: f32,
     pub(crate) dt: f32,
-    /// `tr(J A_0^-1 J^T) / 3` of each skin vertex [1/kg].
-    pub(crate) inverse_mass: &'a [f32],
+    /// Deepest penetration that one step sets out to resolve \[m\].
+    pub(crate) max_correction: f32,
+    /// A multiplier may grow to what presses the skin point this deep \[m\].
+    pub(crate) max_press: f32,
+    pub(crate) surface: &'a SkinSurface,
     /// Contacts of the last tick, all bodies.
     pub(crate) old: &'a [Contact],
 }
 
-/// Contacts hand their load over to a neighbour within this distance [m].
+/// Contacts hand their load over to a neighbour within this distance \[m\].
 const HAND_OVER: f32 = 10e-3;
 
 impl Rows {
@@ -230,10 +235,12 @@ impl Rows {
         self.rows.push(Row {
             contact,
             arm: candidate.point - selection.origin,
-            gap: candidate.gap - contact.bias,
+            gap: (candidate.gap - contact.bias).max(-selection.max_correction),
             stiffness: 0.0,
             friction: selection.friction,
-            inverse_mass: carriers(candidate).map(|(v, w)| w * selection.inverse_mass[v]).sum(),
+            max_force: carriers(candidate).map(|(v, w)| w * selection.surface.static_stiffness[v]).sum::<f32>()
+                * selection.max_press,
+            inverse_mass: carriers(candidate).map(|(v, w)| w * selection.surface.inverse_mass[v]).sum(),
             active: false,
             skin_velocity: V3::zeros(),
             u: V3::zeros(),

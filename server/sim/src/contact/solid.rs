@@ -78,7 +78,7 @@ impl Solid {
         }
     }
 
-    /// Low and high corner of the placed shape [m]; infinite for a half-space.
+    /// Low and high corner of the placed shape \[m\]; infinite for a half-space.
     pub(crate) fn bounds(&self, placement: &Placement) -> [V3; 2] {
         let mut low = V3::repeat(f32::INFINITY);
         let mut high = -low;
@@ -95,7 +95,7 @@ impl Solid {
         [low, high]
     }
 
-    /// Farthest point from the origin [m].
+    /// Farthest point from the origin \[m\].
     pub(crate) fn reach(&self) -> f32 {
         match self {
             Self::Round { a, b, radius } => a.norm().max(b.norm()) + radius,
@@ -163,7 +163,7 @@ pub(crate) fn nearest_on_segment(p: &V3, a: &V3, b: &V3) -> f32 {
     if length_squared <= 0.0 { 0.0 } else { ((p - a).dot(&ab) / length_squared).clamp(0.0, 1.0) }
 }
 
-/// Parameters of the nearest points of the segments `p q` and `a b` [Ericson05, 5.1.9].
+/// Parameters of the nearest points of the segments `p q` and `a b` \[Ericson05, 5.1.9\].
 pub(crate) fn nearest_segments(p: &V3, q: &V3, a: &V3, b: &V3) -> (f32, f32) {
     let (d1, d2, r) = (q - p, b - a, p - a);
     let (aa, ee, f) = (d1.norm_squared(), d2.norm_squared(), d2.dot(&r));

@@ -9,7 +9,7 @@ use crate::embedding::SkinPositions;
 #[derive(Debug, Clone)]
 pub(crate) struct SkinSurface {
     pub(crate) rest: Vec<V3>,
-    /// Area share of each vertex [m2].
+    /// Area share of each vertex \[m2\].
     pub(crate) vertex_areas: Vec<f32>,
     pub(crate) triangles: Vec<[u32; 3]>,
     pub(crate) edges: Vec<[u32; 2]>,
@@ -21,17 +21,19 @@ pub(crate) struct SkinSurface {
     /// Edges and triangles whose first vertex lies in each cluster, as index ranges into the two lists below.
     cluster_edges: Vec<Vec<u32>>,
     cluster_triangles: Vec<Vec<u32>>,
-    /// Longest edge at rest of each cluster's edges and triangles [m].
+    /// Longest edge at rest of each cluster's edges and triangles \[m\].
     cluster_longest_edge: Vec<f32>,
-    /// Length of each edge at rest [m].
+    /// Length of each edge at rest \[m\].
     pub(crate) edge_lengths: Vec<f32>,
-    /// `tr(J A_0^-1 J^T) / 3` of each vertex [1/kg].
+    /// `tr(J A_0^-1 J^T) / 3` of each vertex \[1/kg\].
     pub(crate) inverse_mass: Vec<f32>,
+    /// Force per displacement of each vertex, held still \[N/m\].
+    pub(crate) static_stiffness: Vec<f32>,
 }
 
 impl SkinSurface {
-    /// `inverse_mass` is `[n_skin]`.
-    pub(crate) fn new(skin: &Skin, inverse_mass: Vec<f32>) -> Self {
+    /// `inverse_mass` and `static_stiffness` are `[n_skin]`.
+    pub(crate) fn new(skin: &Skin, inverse_mass: Vec<f32>, static_stiffness: Vec<f32>) -> Self {
         let rest: Vec<V3> = skin.positions().iter().map(|p| p.coords.cast()).collect();
         let triangles: Vec<[u32; 3]> = skin.triangles().iter().map(|t| t.map(|v| v.0)).collect();
         let edges: Vec<[u32; 2]> = skin.edges().iter().map(|e| e.map(|v| v.0)).collect();
@@ -80,10 +82,11 @@ impl SkinSurface {
             cluster_edges,
             cluster_triangles,
             inverse_mass,
+            static_stiffness,
         }
     }
 
-    /// Longest edge at rest of the triangles at a cluster's vertices [m].
+    /// Longest edge at rest of the triangles at a cluster's vertices \[m\].
     pub(crate) fn longest_edge(&self, cluster: usize) -> f32 {
         self.cluster_longest_edge[cluster]
     }
@@ -107,7 +110,7 @@ impl SkinSurface {
         (b - a).cross(&(c - a))
     }
 
-    /// Deformed corners of a triangle [m].
+    /// Deformed corners of a triangle \[m\].
     pub(crate) fn corners(&self, skin: &SkinPositions, triangle: usize) -> [V3; 3] {
         self.triangles[triangle].map(|v| V3::from(skin.vertex(v as usize)))
     }

@@ -1,6 +1,6 @@
 //! Corotated kernels over batches of sixteen hexahedra, structure of arrays.
 //!
-//! Force `f = -R K (R^T x - X)` and stiffness product `y = R K R^T p` [MG04], one rotation per element, `K` the rest stiffness.
+//! Force `f = -R K (R^T x - X)` and stiffness product `y = R K R^T p` \[MG04\], one rotation per element, `K` the rest stiffness.
 
 use nalgebra::Vector3;
 use plica_geometry::HexMesh;
@@ -8,7 +8,7 @@ use plica_geometry::HexMesh;
 use super::stiffness::{center_gradients, rest_stiffness};
 use crate::description::{ElementKind, Material};
 use crate::lanes::{F, LANES, Mat3, Node, Vec3, gather, mul, mul_transpose, scatter_add};
-use crate::rotation::{Quaternions, warm_polar_step};
+use crate::rotation::{Quaternions, warm_polar};
 
 /// Entries of a symmetric 24x24 matrix: upper triangle, row by row.
 const SYMMETRIC_24: usize = 300;
@@ -23,11 +23,11 @@ pub(crate) struct ElementBatches {
 struct Batch {
     /// Internal node of each corner.
     nodes: [[u32; LANES]; 8],
-    /// Rest corners relative to the element's centre [m].
+    /// Rest corners relative to the element's centre \[m\].
     rest: [Vec3; 8],
-    /// Gradients of the corner functions at the centre [1/m].
+    /// Gradients of the corner functions at the centre \[1/m\].
     gradients: [Vec3; 8],
-    /// Rest stiffness [N/m].
+    /// Rest stiffness \[N/m\].
     stiffness: Box<[F; SYMMETRIC_24]>,
 }
 
@@ -53,11 +53,11 @@ impl ElementBatches {
         self.batches.len() * LANES * 2 * (24 * 24 + 2 * 8 * 9)
     }
 
-    /// One warm polar step per element: `rotations` follow the deformation gradient at the centre.
+    /// Warm polar decomposition per element: `rotations` follow the deformation gradient at the centre.
     /// `u` are nodal displacements.
     pub(crate) fn update_rotations(&self, u: &[Node], quaternions: &mut [Quaternions], rotations: &mut [Mat3]) {
         for ((batch, q), r) in self.batches.iter().zip(quaternions).zip(rotations) {
-            *r = warm_polar_step(q, &batch.deformation_gradient(u));
+            *r = warm_polar(q, &batch.deformation_gradient(u));
         }
     }
 

@@ -1,7 +1,7 @@
 //! Stiffness of one hexahedron at rest.
 //!
-//! `K = int B^T C B dV`, 2x2x2 Gauss points. The enhanced-strain element adds nine internal modes `alpha` [SR90] in the
-//! incompatible-mode form that passes the patch test on distorted meshes [TBW76]; they are condensed:
+//! `K = int B^T C B dV`, 2x2x2 Gauss points. The enhanced-strain element adds nine internal modes `alpha` \[SR90\] in the
+//! incompatible-mode form that passes the patch test on distorted meshes \[TBW76\]; they are condensed:
 //! `K = K_uu - K_ua K_aa^-1 K_au`.
 
 use nalgebra::{Matrix3, Matrix6, Point3, SMatrix, Vector3};
@@ -12,9 +12,9 @@ use crate::description::{ElementKind, Material};
 type Strain24 = SMatrix<f64, 6, 24>;
 type Strain9 = SMatrix<f64, 6, 9>;
 
-/// Stiffness of a hexahedron at rest, `[24, 24]` [N/m], symmetric; degree of freedom `3 * corner + axis`.
+/// Stiffness of a hexahedron at rest, `[24, 24]` \[N/m\], symmetric; degree of freedom `3 * corner + axis`.
 ///
-/// Corners are in VTK order. Source: [SR90], [TBW76] for [`ElementKind::EnhancedStrain`].
+/// Corners are in VTK order. Source: \[SR90\], \[TBW76\] for [`ElementKind::EnhancedStrain`].
 pub fn rest_stiffness(corners: &[Point3<f64>; 8], material: &Material, kind: ElementKind) -> SMatrix<f64, 24, 24> {
     let elasticity = isotropic_elasticity(material);
     let center = jacobian(corners, [0.0; 3]);
@@ -41,7 +41,7 @@ pub fn rest_stiffness(corners: &[Point3<f64>; 8], material: &Material, kind: Ele
     (stiffness + stiffness.transpose()) * 0.5
 }
 
-/// Share of a hexahedron's mass at each corner, `int rho N_a dV`, `[8]` [kg].
+/// Share of a hexahedron's mass at each corner, `int rho N_a dV`, `[8]` \[kg\].
 pub fn lumped_mass(corners: &[Point3<f64>; 8], density_kg_per_m3: f64) -> [f64; 8] {
     let mut mass = [0.0; 8];
     for xi in gauss_points() {
@@ -53,7 +53,7 @@ pub fn lumped_mass(corners: &[Point3<f64>; 8], density_kg_per_m3: f64) -> [f64; 
     mass
 }
 
-/// Gradients of the corner functions at the centre, `[8, 3]` [1/m]: the deformation gradient there is `sum x_a g_a^T`.
+/// Gradients of the corner functions at the centre, `[8, 3]` \[1/m\]: the deformation gradient there is `sum x_a g_a^T`.
 pub(crate) fn center_gradients(corners: &[Point3<f64>; 8]) -> [Vector3<f64>; 8] {
     let inverse_transpose = inverse_transpose(&jacobian(corners, [0.0; 3]));
     shape_gradients([0.0; 3]).map(|g| inverse_transpose * Vector3::from(g))
@@ -65,7 +65,7 @@ fn gauss_points() -> impl Iterator<Item = [f64; 3]> {
     (0..8).map(move |i| [i & 1, (i >> 1) & 1, (i >> 2) & 1].map(|bit| if bit == 0 { -g } else { g }))
 }
 
-/// `J = dX / dxi`, columns are the derivatives by one natural coordinate [m].
+/// `J = dX / dxi`, columns are the derivatives by one natural coordinate \[m\].
 fn jacobian(corners: &[Point3<f64>; 8], xi: [f64; 3]) -> Matrix3<f64> {
     corners.iter().zip(shape_gradients(xi)).map(|(x, g)| x.coords * Vector3::from(g).transpose()).sum()
 }
@@ -86,7 +86,7 @@ fn strain_of_displacement(natural_gradients: &[[f64; 3]; 8], inverse_transpose: 
 }
 
 /// Strain of the incompatible modes `1 - xi_k^2`, gradients taken with the Jacobian at the centre and scaled by `j_0 / j`,
-/// so that their volume integral vanishes [TBW76].
+/// so that their volume integral vanishes \[TBW76\].
 fn strain_of_modes(xi: [f64; 3], center_inverse_transpose: &Matrix3<f64>, scale: f64) -> Strain9 {
     let mut g = Strain9::zeros();
     for k in 0..3 {
@@ -111,7 +111,7 @@ fn strain_columns(g: &Vector3<f64>) -> SMatrix<f64, 6, 3> {
     )
 }
 
-/// `C = lambda 1 1^T + 2 mu I` in engineering notation [Pa].
+/// `C = lambda 1 1^T + 2 mu I` in engineering notation \[Pa\].
 fn isotropic_elasticity(material: &Material) -> Matrix6<f64> {
     let (e, nu) = (material.young_modulus_pa, material.poisson_ratio);
     let lambda = e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));

@@ -1,7 +1,7 @@
 //! Exact inverse of the rest matrix by block elimination over layers, warped by node rotations.
 //!
 //! With layers coupled to neighbours only, `A_0 = (I + L) D (I + L^T)`: `D_k = A_kk - L_k A_{k-1,k}`,
-//! `L_k = A_{k,k-1} D_{k-1}^-1` [GVL13, 4.5]. `D_k^-1`, `L_k` and `L_k^T` are stored as dense panels.
+//! `L_k = A_{k,k-1} D_{k-1}^-1` \[GVL13, 4.5\]. `D_k^-1`, `L_k` and `L_k^T` are stored as dense panels.
 //! Warping: `z = R A_0^-1 R^T r`, `R` the mean rotation of the elements around a node.
 
 use nalgebra::DMatrix;

@@ -1,4 +1,4 @@
-//! Preconditioned conjugate gradients [Saad03, alg. 9.1], matrix-free.
+//! Preconditioned conjugate gradients \[Saad03, alg. 9.1\], matrix-free.
 
 use super::vector::{add_scaled, dot, norm_squared, scale_and_add};
 use crate::lanes::Node;
@@ -20,7 +20,7 @@ impl CgScratch {
 /// When to stop.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CgStop {
-    /// Norm of the residual at which the solve has converged [N s].
+    /// Norm of the residual at which the solve has converged \[N s\].
     pub(crate) residual: f32,
     /// Most iterations.
     pub(crate) max_iterations: u32,

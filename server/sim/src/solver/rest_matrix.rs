@@ -9,14 +9,14 @@ use super::NodeOrder;
 use crate::description::{ElementKind, Material};
 use crate::element::rest_stiffness;
 
-/// Symmetric block-sparse matrix; `rows[i][j]` is the 3x3 block of free nodes `i`, `j` [kg].
+/// Symmetric block-sparse matrix; `rows[i][j]` is the 3x3 block of free nodes `i`, `j` \[kg\].
 #[derive(Debug, Clone)]
 pub(crate) struct RestMatrix {
     pub(crate) rows: Vec<BTreeMap<usize, Matrix3<f64>>>,
 }
 
 impl RestMatrix {
-    /// `node_mass` is `[n_nodes]` in internal order [kg]; `h` the step [s].
+    /// `node_mass` is `[n_nodes]` in internal order \[kg\]; `h` the step \[s\].
     pub(crate) fn new(
         mesh: &HexMesh,
         order: &NodeOrder,
