@@ -11,7 +11,7 @@ use crate::lanes::{F, LANES, Node};
 use wide::{i16x16, i32x16};
 
 /// Vertices per inner kernel: six accumulators stay in registers.
-const STRIP: usize = 2 * LANES;
+const STRIP: usize = if cfg!(target_feature = "avx512f") { 4 } else { 2 } * LANES;
 const STRIPS: usize = CLUSTER_SIZE / STRIP;
 /// Vectors per axis and strip.
 const WIDE: usize = STRIP / LANES;
@@ -224,14 +224,22 @@ fn round_keeping_sum(values: impl Iterator<Item = f64>) -> impl Iterator<Item = 
 
 #[inline(always)]
 fn bounding_box(positions: &[[F; GROUPS]; 3]) -> [[f32; 3]; 2] {
-    let reduce = |axis: &[F; GROUPS], better: fn(F, F) -> F, scalar: fn(f32, f32) -> f32| {
-        let lanes = axis.iter().copied().reduce(better).unwrap_or(F::ZERO).to_array();
-        lanes.into_iter().reduce(scalar).unwrap_or(0.0)
-    };
     [
-        std::array::from_fn(|k| reduce(&positions[k], F::fast_min, f32::min)),
-        std::array::from_fn(|k| reduce(&positions[k], F::fast_max, f32::max)),
+        std::array::from_fn(|k| reduce(&positions[k], F::fast_min, |a, b| if a < b { a } else { b })),
+        std::array::from_fn(|k| reduce(&positions[k], F::fast_max, |a, b| if a > b { a } else { b })),
     ]
+}
+
+/// Halves the lanes until one is left.
+#[inline(always)]
+fn reduce(axis: &[F; GROUPS], vector: impl Fn(F, F) -> F, scalar: impl Fn(f32, f32) -> f32) -> f32 {
+    let mut lanes = axis[1..].iter().fold(axis[0], |a, b| vector(a, *b)).to_array();
+    for width in [8, 4, 2, 1] {
+        for lane in 0..width {
+            lanes[lane] = scalar(lanes[lane], lanes[lane + width]);
+        }
+    }
+    lanes[0]
 }
 
 fn copy_axes(cluster: &[[F; GROUPS]; 3], out: &mut [[f32; 3]]) {

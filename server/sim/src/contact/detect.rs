@@ -152,8 +152,8 @@ impl Detector {
                     let (a, b) = (placement.to_world(*a), placement.to_world(*b));
                     let axis = b - a;
                     let inverse = if a == b { 0.0 } else { 1.0 / axis.norm_squared() };
-                    for (lane, d) in distances.iter_mut().enumerate() {
-                        let (px, py, pz) = (x[lane] - a.x, y[lane] - a.y, z[lane] - a.z);
+                    for (((d, x), y), z) in distances.iter_mut().zip(x).zip(y).zip(z) {
+                        let (px, py, pz) = (x - a.x, y - a.y, z - a.z);
                         let t = ((px * axis.x + py * axis.y + pz * axis.z) * inverse).clamp(0.0, 1.0);
                         let (qx, qy, qz) = (px - t * axis.x, py - t * axis.y, pz - t * axis.z);
                         *d = (qx * qx + qy * qy + qz * qz).sqrt() - radius;

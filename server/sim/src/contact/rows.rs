@@ -289,13 +289,7 @@ impl Rows {
     pub(crate) fn jacobian_product(&self, row: usize, v: &[Node]) -> V3 {
         let row = &self.rows[row];
         let range = row.first_entry as usize..row.last_entry as usize;
-        let mut sum = [0.0_f32; 4];
-        for (&node, &w) in self.nodes[range.clone()].iter().zip(&self.weights[range]) {
-            let n = &v[node as usize];
-            for k in 0..4 {
-                sum[k] = w.mul_add(n[k], sum[k]);
-            }
-        }
+        let sum = weighted_sum(&self.nodes[range.clone()], &self.weights[range], v);
         V3::new(sum[0], sum[1], sum[2])
     }
 
@@ -338,15 +332,28 @@ fn carriers(candidate: &Candidate) -> impl Iterator<Item = (usize, f32)> {
 }
 
 fn point_velocity(embedding: &SkinEmbedding, v: &[Node], candidate: &Candidate) -> V3 {
-    let mut velocity = V3::zeros();
+    let mut sum = [0.0; 4];
     for (vertex, weight) in carriers(candidate) {
         let (nodes, weights) = embedding.row(vertex);
-        for (&node, w) in nodes.iter().zip(weights) {
-            let n = &v[node as usize];
-            velocity += V3::new(n[0], n[1], n[2]) * (w * weight);
+        let part = weighted_sum(nodes, weights, v);
+        for k in 0..4 {
+            sum[k] += weight * part[k];
         }
     }
-    velocity
+    V3::new(sum[0], sum[1], sum[2])
+}
+
+/// `sum_a w_a v_a`; the padding is carried along, so that a node is one vector operation.
+#[inline(always)]
+fn weighted_sum(nodes: &[u32], weights: &[f32], v: &[Node]) -> Node {
+    let mut sum = [0.0_f32; 4];
+    for (&node, &w) in nodes.iter().zip(weights) {
+        let n = &v[node as usize];
+        for k in 0..4 {
+            sum[k] = w.mul_add(n[k], sum[k]);
+        }
+    }
+    sum
 }
 
 fn continued(old: &Contact, candidate: &Candidate) -> Contact {
