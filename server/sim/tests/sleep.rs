@@ -94,6 +94,10 @@ fn released_object_sleeps_close_to_rest() {
     run.hold(above(0.1), 5.0, |run, report| {
         if report.sleeping {
             asleep_after.get_or_insert((run.clock_s - 2.2, farthest(run)));
+            assert!(
+                run.state.node_velocities(&run.model).iter().all(|v| v.norm() == 0.0),
+                "a sleeping object has speed"
+            );
         }
     });
     let (seconds, offset) = asleep_after.unwrap();
