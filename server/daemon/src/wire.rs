@@ -18,7 +18,8 @@ pub fn pose_sample(pose: &Pose) -> PoseSample {
     let translation = Translation3::from(pose.position_m);
     PoseSample {
         sequence: pose.sequence,
-        source_time_ns: pose.source_time_ns,
+        // 0 on the wire means that the source does not know its time.
+        source_time_ns: (pose.source_time_ns != 0).then_some(pose.source_time_ns),
         valid: pose.valid,
         pose: Isometry3::from_parts(translation, rotation),
     }

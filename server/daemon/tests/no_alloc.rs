@@ -29,7 +29,7 @@ fn ten_thousand_turns_allocate_nothing() {
     for k in 0..10_000_u64 {
         let t = k as f64 * 1e-3;
         let pose = Isometry3::translation(0.05 + 0.01 * (2.0 * t).sin(), 0.03, 0.031 + 0.004 * (5.0 * t).cos());
-        ports.poses[0].push(PoseSample { sequence: k + 1, source_time_ns: k, valid: true, pose }).unwrap();
+        ports.poses[0].push(PoseSample { sequence: k + 1, source_time_ns: Some(k), valid: true, pose }).unwrap();
         if k % 1000 == 500 {
             ports.commands.orders.push(Command::Snapshot).unwrap();
         }

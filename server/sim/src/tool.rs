@@ -9,8 +9,8 @@ use crate::description::{Sampling, ToolDescription};
 pub struct PoseSample {
     /// Sequence number of its source.
     pub sequence: u64,
-    /// Time on its source's clock \[ns\].
-    pub source_time_ns: u64,
+    /// Time on its source's clock \[ns\], if the source knows it; else the time of arrival stands in.
+    pub source_time_ns: Option<u64>,
     /// Whether the tracker saw the marker; an invalid sample is no news.
     pub valid: bool,
     /// `tracker <- marker` \[m\].
@@ -32,9 +32,14 @@ const RING: usize = 16;
 /// A sample in world coordinates with its arrival.
 #[derive(Debug, Clone, Copy)]
 struct Arrived {
+    /// Counts samples, from 1.
+    number: u64,
     arrival_s: f64,
-    source_s: f64,
+    /// Time on the source's clock, if it knows it.
+    source_s: Option<f64>,
     world_from_tool: Isometry3<f64>,
+    /// The tool cannot have moved here from the sample before: it is placed.
+    is_jump: bool,
 }
 
 /// The pose ring of one tool and the target that its proxy follows.
@@ -48,8 +53,8 @@ pub(crate) struct PoseTrack {
     pub(crate) sequence: u64,
     pub(crate) source_time_ns: u64,
     pub(crate) placements: u64,
-    /// A sample came that is too far from the one before it: the next target is a placement.
-    must_place: bool,
+    /// Number of the newest sample that a target has reached.
+    reached: u64,
 }
 
 /// Where the device is at the end of this tick, and how it moved in it.
@@ -72,7 +77,7 @@ impl PoseTrack {
             sequence: 0,
             source_time_ns: 0,
             placements: 0,
-            must_place: false,
+            reached: 0,
         }
     }
 
@@ -84,16 +89,26 @@ impl PoseTrack {
         if !sample.valid {
             return true;
         }
-        let source_s = sample.source_time_ns as f64 * 1e-9;
-        let arrived = Arrived { arrival_s: clock_s, source_s, world_from_tool: world_from_tool(tool, &sample.pose) };
+        let source_s = sample.source_time_ns.map(|ns| ns as f64 * 1e-9);
+        let mut arrived = Arrived {
+            number: 1,
+            arrival_s: clock_s,
+            source_s,
+            world_from_tool: world_from_tool(tool, &sample.pose),
+            is_jump: false,
+        };
         if let Some(last) = self.ring[self.newest] {
-            self.must_place |= is_jump(&last, &arrived, tool.max_tool_speed_m_per_s);
+            arrived.number = last.number + 1;
+            arrived.is_jump = is_jump(&last, &arrived, tool.max_tool_speed_m_per_s);
+            if source_s.zip(last.source_s).is_some_and(|(now, before)| now < before) {
+                self.forget_source();
+            }
         }
         self.newest = (self.newest + 1) % RING;
         self.ring[self.newest] = Some(arrived);
-        self.clock_offset_s = self.clock_offset_s.min(clock_s - source_s);
+        self.clock_offset_s = source_s.map_or(f64::INFINITY, |s| clock_s - s).min(self.clock_offset_s);
         self.sequence = sample.sequence;
-        self.source_time_ns = sample.source_time_ns;
+        self.source_time_ns = sample.source_time_ns.unwrap_or(0);
         true
     }
 
@@ -104,38 +119,59 @@ impl PoseTrack {
 
     /// Moves the target on by one tick of `dt` seconds; `None` before the first sample.
     pub(crate) fn advance(&mut self, tool: &ToolDescription, clock_s: f64, dt: f64) -> Option<Target> {
-        let wanted = match tool.sampling {
-            Sampling::Latest => self.ring[self.newest]?.world_from_tool,
+        let (wanted, reached) = match tool.sampling {
+            Sampling::Latest => self.ring[self.newest].map(|s| (s.world_from_tool, s.number))?,
             Sampling::Interpolate { delay_s } => self.interpolate(clock_s - delay_s)?,
         };
         let target = match self.target {
-            Some(last) if !self.must_place => Target {
-                pose: towards(&last.pose, &wanted, tool.max_tool_speed_m_per_s * dt),
-                before: last.pose,
-                placed: false,
-            },
+            Some(last) if !self.jumps_before(reached) => {
+                let max_distance = tool.max_tool_speed_m_per_s * dt;
+                Target { pose: towards(&last.pose, &wanted, max_distance), before: last.pose, placed: false }
+            }
             last => {
                 self.placements += u64::from(last.is_some());
                 Target { pose: wanted, before: wanted, placed: true }
             }
         };
-        self.must_place = false;
+        self.reached = self.reached.max(reached);
         self.target = Some(target);
         self.target
     }
 
-    /// Pose at `time_s` on the caller's clock, from the two samples around it; held at either end of the ring.
-    fn interpolate(&self, time_s: f64) -> Option<Isometry3<f64>> {
-        let source_s = time_s - self.clock_offset_s;
+    /// Whether a jump lies between the samples reached so far and sample `number`.
+    fn jumps_before(&self, number: u64) -> bool {
+        self.ring.iter().flatten().any(|s| s.is_jump && s.number > self.reached && s.number <= number)
+    }
+
+    /// The source's clock went back: it started again, and old times mean nothing any more.
+    fn forget_source(&mut self) {
+        self.ring = [None; RING];
+        self.clock_offset_s = f64::INFINITY;
+    }
+
+    /// Pose at `time_s` on the caller's clock, from the two samples around it, and the number of the earlier one; held at
+    /// either end of the ring, and before a jump.
+    fn interpolate(&self, time_s: f64) -> Option<(Isometry3<f64>, u64)> {
         let mut after: Option<Arrived> = None;
         for back in 0..RING {
             let Some(sample) = self.ring[(self.newest + RING - back) % RING] else { break };
-            if sample.source_s <= source_s {
-                return Some(after.map_or(sample.world_from_tool, |after| between(&sample, &after, source_s)));
+            let at_s = self.clock_time_s(&sample);
+            if at_s <= time_s {
+                let next = after.filter(|a| !a.is_jump);
+                let share = |next: &Arrived| (time_s - at_s) / (self.clock_time_s(next) - at_s).max(1e-9);
+                let pose = next.map_or(sample.world_from_tool, |next| {
+                    blend(&sample.world_from_tool, &next.world_from_tool, share(&next).clamp(0.0, 1.0))
+                });
+                return Some((pose, sample.number));
             }
             after = Some(sample);
         }
-        after.map(|a| a.world_from_tool)
+        after.map(|a| (a.world_from_tool, a.number))
+    }
+
+    /// When a sample was taken, on the caller's clock: its source's time shifted by the smallest latency seen \[s\].
+    fn clock_time_s(&self, sample: &Arrived) -> f64 {
+        sample.source_s.map_or(sample.arrival_s, |s| s + self.clock_offset_s)
     }
 }
 
@@ -150,7 +186,8 @@ fn world_from_tool(tool: &ToolDescription, tracker_from_marker: &Isometry3<f64>)
 /// Whether the tool would have to be faster than it may be to get from one sample to the next.
 fn is_jump(from: &Arrived, to: &Arrived, max_speed: f64) -> bool {
     let distance = (to.world_from_tool.translation.vector - from.world_from_tool.translation.vector).norm();
-    let elapsed = (to.source_s - from.source_s).max(to.arrival_s - from.arrival_s);
+    let by_source = to.source_s.zip(from.source_s).map_or(0.0, |(to, from)| to - from);
+    let elapsed = by_source.max(to.arrival_s - from.arrival_s);
     distance > max_speed * elapsed.max(1e-3)
 }
 
@@ -160,11 +197,6 @@ fn towards(from: &Isometry3<f64>, to: &Isometry3<f64>, max_distance: f64) -> Iso
     let distance = (to.translation.vector - from.translation.vector).norm();
     let path = distance.max(LEVER_M * from.rotation.angle_to(&to.rotation));
     if path <= max_distance { *to } else { blend(from, to, max_distance / path) }
-}
-
-fn between(from: &Arrived, to: &Arrived, source_s: f64) -> Isometry3<f64> {
-    let span = (to.source_s - from.source_s).max(1e-9);
-    blend(&from.world_from_tool, &to.world_from_tool, ((source_s - from.source_s) / span).clamp(0.0, 1.0))
 }
 
 fn blend(from: &Isometry3<f64>, to: &Isometry3<f64>, share: f64) -> Isometry3<f64> {

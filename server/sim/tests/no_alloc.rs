@@ -79,7 +79,7 @@ fn ten_thousand_ticks_with_contact_allocate_nothing() {
             tool: k,
             sample: PoseSample {
                 sequence: n,
-                source_time_ns: n * 1_000_000,
+                source_time_ns: Some(n * 1_000_000),
                 valid: !n.is_multiple_of(97),
                 pose: pose(k, n as usize),
             },

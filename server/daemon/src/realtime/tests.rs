@@ -30,7 +30,12 @@ fn start(lock_step: bool) -> (Loop, Ports) {
 }
 
 fn sample(sequence: u64, z: f64) -> PoseSample {
-    PoseSample { sequence, source_time_ns: 1000 * sequence, valid: true, pose: Isometry3::translation(0.02, 0.02, z) }
+    PoseSample {
+        sequence,
+        source_time_ns: Some(1000 * sequence),
+        valid: true,
+        pose: Isometry3::translation(0.02, 0.02, z),
+    }
 }
 
 fn order(core: &mut Loop, ports: &mut Ports, command: Command) -> Result<Outcome, Refusal> {

@@ -156,9 +156,8 @@ impl BlockTridiagonal {
             let nodes = layer.first_node..layer.first_node + layer.n_nodes;
             let source = x[layer.offset..].chunks_exact(3);
             for ((z, x), m) in z[nodes.clone()].iter_mut().zip(source).zip(&rotations[nodes]) {
-                for c in 0..3 {
-                    z[c] = m[3 * c] * x[0] + m[3 * c + 1] * x[1] + m[3 * c + 2] * x[2];
-                }
+                let turned = |c: usize| m[3 * c] * x[0] + m[3 * c + 1] * x[1] + m[3 * c + 2] * x[2];
+                *z = [turned(0), turned(1), turned(2), 0.0];
             }
         }
     }

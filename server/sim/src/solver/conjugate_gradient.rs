@@ -55,8 +55,12 @@ pub(crate) fn conjugate_gradient(
         }
         precondition(r, &mut scratch.z);
         let rho_before = std::mem::replace(&mut rho, dot(r, &scratch.z));
-        let beta = if iteration == 0 { 0.0 } else { rho / rho_before };
-        scale_and_add(&mut scratch.p[..n_free], beta, &scratch.z);
+        if iteration == 0 {
+            // A copy, as zero times the direction of a solve that went wrong may not be zero.
+            scratch.p[..n_free].copy_from_slice(&scratch.z);
+        } else {
+            scale_and_add(&mut scratch.p[..n_free], rho / rho_before, &scratch.z);
+        }
         multiply(&scratch.p, &mut scratch.product);
         let curvature = dot(&scratch.p[..n_free], &scratch.product[..n_free]);
         if curvature.is_nan() || curvature <= 0.0 {

@@ -123,7 +123,7 @@ impl Run {
     /// One tick with the tools at these poses.
     pub fn tick(&mut self, poses: &[(usize, Isometry3<f64>)]) -> TickReport {
         self.sequence += 1;
-        let source_time_ns = (self.clock_s * 1e9) as u64;
+        let source_time_ns = Some((self.clock_s * 1e9) as u64);
         let sample = |pose| PoseSample { sequence: self.sequence, source_time_ns, valid: true, pose };
         let poses: Vec<ToolPose> = poses.iter().map(|&(tool, pose)| ToolPose { tool, sample: sample(pose) }).collect();
         let input = TickInput { clock_s: self.clock_s, poses: &poses };
