@@ -1,5 +1,6 @@
-//! What a client needs from the mesh reply: rest positions in world coordinates.
+//! What a client needs from the mesh reply: rest positions in world coordinates, and triangles.
 
+use gltf::Gltf;
 use thiserror::Error;
 
 /// A GLB that is not the protocol's mesh.
@@ -17,8 +18,18 @@ pub enum MeshError {
 ///
 /// The root node of the GLB turns them to glTF's y up; its transform is not applied here.
 pub fn rest_positions(glb: &[u8]) -> Result<Vec<[f32; 3]>, MeshError> {
-    let gltf = gltf::Gltf::from_slice(glb).map_err(Box::new)?;
+    rest_mesh(glb).map(|(positions, _)| positions)
+}
+
+/// Rest positions as [`rest_positions`] gives them, and the vertices of each triangle, counter-clockwise from outside.
+pub fn rest_mesh(glb: &[u8]) -> Result<(Vec<[f32; 3]>, Vec<[u32; 3]>), MeshError> {
+    let gltf = Gltf::from_slice(glb).map_err(Box::new)?;
     let primitive = gltf.meshes().flat_map(|mesh| mesh.primitives()).next().ok_or(MeshError::Empty)?;
-    let positions = primitive.reader(|_| gltf.blob.as_deref()).read_positions().ok_or(MeshError::Empty)?;
-    Ok(positions.collect())
+    let reader = primitive.reader(|_| gltf.blob.as_deref());
+    let positions: Vec<_> = reader.read_positions().ok_or(MeshError::Empty)?.collect();
+    let indices: Vec<u32> = match reader.read_indices() {
+        Some(indices) => indices.into_u32().collect(),
+        None => (0..positions.len() as u32).collect(),
+    };
+    Ok((positions, indices.as_chunks().0.to_vec()))
 }

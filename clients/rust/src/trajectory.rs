@@ -10,13 +10,15 @@
 
 mod fit;
 mod read;
+mod terrain;
 
 use std::path::PathBuf;
 
 use thiserror::Error;
 
-pub use fit::{Fit, Workspace, fit};
+pub use fit::{Fit, Workspace, fit, fit_above, fitted_depth_m};
 pub use read::read;
+pub use terrain::Terrain;
 
 /// The header of a CSV trajectory.
 pub const CSV_HEADER: [&str; 9] = ["time_s", "tool", "px", "py", "pz", "qx", "qy", "qz", "qw"];

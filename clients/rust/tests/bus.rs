@@ -7,12 +7,11 @@ use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
 use common::{SmallDaemon, frame, mesh_bytes};
-use plica_client::mesh::rest_positions;
+use plica_client::mesh::{rest_mesh, rest_positions};
 use plica_client::protocol::pose::Pose;
 use plica_client::protocol::rpc::StepReply;
 use plica_client::{Client, ClientError, ClientOptions, PoseSource};
 use serde_json::json;
-use zenoh::Wait;
 
 const LONG: Duration = Duration::from_secs(5);
 
@@ -23,7 +22,8 @@ fn poses_out_wrenches_back() {
     let wrenches = client.subscribe_wrenches("probe", 1000).unwrap();
     let mut source = PoseSource::new();
     let sent: Vec<Pose> = (0..100).map(|i| source.pose([f64::from(i), 0.0, 0.0], [0.0, 0.0, 0.0, 1.0])).collect();
-    sent.iter().for_each(|pose| client.publish_pose("probe", pose).unwrap());
+    let publisher = client.lossless_pose_publisher("probe").unwrap();
+    sent.iter().for_each(|pose| publisher.publish(pose).unwrap());
     for pose in &sent {
         let echo = wrenches.next(LONG).expect("an echo of each pose").wrench;
         assert_eq!((echo.pose_source_time_ns, echo.force_n), (pose.source_time_ns, pose.position_m));
@@ -42,11 +42,11 @@ fn a_slow_reader_gets_the_latest_skin_and_counts_the_rest() {
     let key = client.keys().skin("wedge");
     let deadline = Instant::now() + LONG;
     while skins.stats().received == 0 && Instant::now() < deadline {
-        daemon.session.put(&key, frame(1)).wait().unwrap();
+        daemon.put(&key, frame(1));
         std::thread::sleep(Duration::from_millis(20));
     }
-    daemon.session.put(&key, b"no skin".to_vec()).wait().unwrap();
-    (10..20).for_each(|n| daemon.session.put(&key, frame(n)).wait().unwrap());
+    daemon.put(&key, b"no skin".to_vec());
+    (10..20).for_each(|n| daemon.put(&key, frame(n)));
     let mut newest = 0;
     while newest != 19 {
         newest = skins.next(LONG).expect("the newest frame").header.sequence;
@@ -78,6 +78,7 @@ fn a_mesh_in_pieces_is_checked() {
     let glb = client.mesh("wedge").unwrap();
     assert_eq!(glb, mesh_bytes());
     assert_eq!(rest_positions(&glb).unwrap()[1], [0.04, 0.0, 0.01]);
+    assert_eq!(rest_mesh(&glb).unwrap().1, [[0, 1, 2], [0, 2, 3]]);
     assert!(rest_positions(b"glTF").is_err());
     assert!(matches!(client.mesh("broken"), Err(ClientError::Checksum { .. })));
 }

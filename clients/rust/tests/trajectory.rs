@@ -1,7 +1,7 @@
 //! Trajectory files: what is read, what is refused and where, and how a motion is fitted into a workspace.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
-use plica_client::trajectory::{TrackedPose, Workspace, fit, read};
+use plica_client::trajectory::{Terrain, TrackedPose, Workspace, fit, fit_above, fitted_depth_m, read};
 use tempfile::TempDir;
 
 fn read_text(name: &str, text: &str) -> Result<Vec<TrackedPose>, String> {
@@ -126,5 +126,27 @@ fn a_workspace_needs_room() {
     for max_m in [[0.1, 0.0, 0.1], [-0.1, 0.1, 0.1], [f64::NAN; 3], [f64::INFINITY; 3]] {
         let error = fit(&mut at(&[[0.0; 3]]), Workspace { min_m: [0.0; 3], max_m }).unwrap_err();
         assert!(error.to_string().contains("has no room"), "{error}");
+    }
+}
+
+/// 100 x 60 mm, from 40 mm high at x = 0 to 10 mm.
+fn slope() -> Terrain {
+    let corners = [[0.0, 0.0, 0.04], [0.1, 0.0, 0.01], [0.1, 0.06, 0.01], [0.0, 0.06, 0.04], [0.0; 3]];
+    Terrain::new(&corners, &[[0, 1, 2], [0, 2, 3], [0, 3, 4]]).unwrap()
+}
+
+#[test]
+fn a_motion_fitted_above_an_object_presses_as_deep_as_asked_and_no_deeper() {
+    let slope = slope();
+    assert!((fitted_depth_m(&slope) - 0.3 * 0.025).abs() < 1e-9);
+    for flat in [0.1, 10.0] {
+        let mut poses = at(&[[0.0, 0.0, 1.0], [4.0, 1.0, 1.0 + flat], [4.0, 0.0, 1.0], [0.0, 1.0, 1.0]]);
+        let done = fit_above(&mut poses, &slope, 0.007, 0.005).unwrap();
+        let depth = |p: &TrackedPose| p.position_m[0] * 0.3 - 0.04 + p.position_m[2] - 0.007;
+        let lowest = poses.iter().map(depth).fold(f64::INFINITY, f64::min);
+        assert!((lowest + 0.005).abs() < 1e-6, "{lowest}");
+        assert!(poses.iter().all(|p| (0.0249..0.0751).contains(&p.position_m[0])), "{poses:?}");
+        let first = done.to_m[2] + done.scale * (1.0 - done.from_m[2]);
+        assert!((poses[0].position_m[2] - first).abs() < 1e-12, "what it says it did");
     }
 }

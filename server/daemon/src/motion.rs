@@ -2,16 +2,13 @@
 
 use std::path::Path;
 
-use plica_client::trajectory::{self, Fit, TrackedPose, TrajectoryError, Workspace};
+use plica_client::trajectory::{self, Fit, Terrain, TrackedPose, TrajectoryError};
 use plica_protocol::pose::Pose;
 use plica_sim::{ToolDescription, ToolShape};
 
 use crate::config::{Config, MeshConfig};
-
-/// How far a fitted motion goes below the place of first touch \[m\], at most.
-const DEPTH_M: f64 = 0.008;
-/// How far it goes above that \[m\].
-const CLEARANCE_M: f64 = 0.03;
+use crate::scene;
+use crate::surface::Surface;
 
 /// Why poses cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -59,7 +56,7 @@ pub fn read(
 ) -> Result<(Vec<TimedPose>, Option<Fit>), MotionError> {
     let mut tracked = trajectory::read(file)?;
     let default_tool = which_tool(file, config, &tracked, default_tool)?;
-    let fitted = if fit { Some(fit_above(config, default_tool, &mut tracked)?) } else { None };
+    let fitted = if fit { Some(fit_onto(config, default_tool, &mut tracked)?) } else { None };
     let mut sequences = vec![0; config.tools().len()];
     let mut poses = Vec::with_capacity(tracked.len());
     for t in &tracked {
@@ -105,33 +102,12 @@ fn known(config: &Config) -> String {
     if names.is_empty() { "no tools".into() } else { names.join(", ") }
 }
 
-/// Maps a motion into [`room_above`], and then down until its deepest pose presses as far as the room goes.
-///
-/// One scale keeps the motion's shape, so a motion that is wide and flat would hover in the middle of the room.
-fn fit_above(config: &Config, tool: usize, tracked: &mut [TrackedPose]) -> Result<Fit, TrajectoryError> {
-    let mut fit = trajectory::fit(tracked, room_above(config, tool))?;
-    let radius = config.tools().get(tool).map_or(0.0, tip_radius_m);
-    let height = |p: &TrackedPose| p.position_m[2] - radius - top_height_m(config, p.position_m[0]);
-    let lowest = tracked.iter().map(height).fold(f64::INFINITY, f64::min);
-    let down = lowest + depth_m(config);
-    tracked.iter_mut().for_each(|p| p.position_m[2] -= down);
-    fit.to_m[2] -= down;
-    Ok(fit)
-}
-
-/// How deep a fitted motion presses \[m\]: no more than a third of the object's height.
-fn depth_m(config: &Config) -> f64 {
-    let [x, ..] = config.object().mesh().extents_m();
-    DEPTH_M.min(0.3 * top_height_m(config, 0.5 * x))
-}
-
-/// The middle half of the object, from a press of `DEPTH_M` to `CLEARANCE_M` above the surface.
-pub fn room_above(config: &Config, tool: usize) -> Workspace {
-    let [x, y, _] = config.object().mesh().extents_m();
-    let top = top_height_m(config, 0.5 * x);
-    let touch = top + config.tools().get(tool).map_or(0.0, tip_radius_m);
-    let depth = DEPTH_M.min(0.3 * top);
-    Workspace { min_m: [0.25 * x, 0.25 * y, touch - depth], max_m: [0.75 * x, 0.75 * y, touch + CLEARANCE_M] }
+/// Fits a motion onto the object's skin, as `plica probe --fit` does with the mesh that it is given.
+fn fit_onto(config: &Config, tool: usize, tracked: &mut [TrackedPose]) -> Result<Fit, TrajectoryError> {
+    let surface = Surface::new(&scene::skin(config));
+    let terrain = Terrain::new(&surface.rest, &surface.triangles).expect("a closed skin has triangles");
+    let tip_radius_m = config.tools().get(tool).map_or(0.0, tip_radius_m);
+    trajectory::fit_above(tracked, &terrain, tip_radius_m, trajectory::fitted_depth_m(&terrain))
 }
 
 /// Height of the object's top above z = 0 at `x` \[m\].
@@ -175,8 +151,9 @@ mod tests {
         assert!(fit.is_some());
         let height = |p: &TimedPose| p.pose.position_m[2] - 0.007 - top_height_m(&config, p.pose.position_m[0]);
         let lowest = poses.iter().map(height).fold(f64::INFINITY, f64::min);
-        assert!((lowest + depth_m(&config)).abs() < 1e-9, "{lowest}");
-        assert!(poses.iter().all(|p| (0.03..=0.09).contains(&p.pose.position_m[0])));
+        let depth = 0.3 * top_height_m(&config, 0.06);
+        assert!((lowest + depth).abs() < 1e-6, "{lowest}");
+        assert!(poses.iter().all(|p| (0.029999..0.090001).contains(&p.pose.position_m[0])));
     }
 
     #[test]

@@ -80,6 +80,11 @@ pub fn describe(config: &Config) -> Result<ModelDescription, SceneError> {
     })
 }
 
+/// The skin of a scene's object.
+pub fn skin(config: &Config) -> Skin {
+    generate(config.object()).1
+}
+
 fn generate(object: &ObjectConfig) -> (HexMesh, Skin) {
     let (divisions, spacing) = (object.divisions(), object.skin().spacing_m);
     match object.mesh() {

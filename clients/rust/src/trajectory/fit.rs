@@ -2,7 +2,14 @@
 
 use std::collections::HashMap;
 
-use super::{TrackedPose, TrajectoryError};
+use super::{Terrain, TrackedPose, TrajectoryError};
+
+/// How deep a fitted motion presses, at most, unless told otherwise.
+const DEPTH_M: f64 = 0.008;
+/// The same as a share of the object's height in its middle.
+const DEPTH_SHARE: f64 = 0.3;
+/// How far above first touch the room for a fitted motion ends.
+const CLEARANCE_M: f64 = 0.03;
 
 /// A box in the world frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,7 +46,8 @@ pub fn fit(poses: &mut [TrackedPose], workspace: Workspace) -> Result<Fit, Traje
     if !has_room {
         return Err(TrajectoryError::Workspace { min_m, max_m });
     }
-    let bounds = bounds(poses);
+    let nothing = Workspace { min_m: [0.0; 3], max_m: [0.0; 3] };
+    let bounds = Workspace::around(poses.iter().map(|pose| &pose.position_m)).unwrap_or(nothing);
     let scale = (0..3)
         .filter(|&i| bounds.max_m[i] > bounds.min_m[i])
         .map(|i| (max_m[i] - min_m[i]) / (bounds.max_m[i] - bounds.min_m[i]))
@@ -53,7 +61,66 @@ pub fn fit(poses: &mut [TrackedPose], workspace: Workspace) -> Result<Fit, Traje
     Ok(Fit { scale, from_m, to_m })
 }
 
+/// Fits a motion into the room above an object with [`fit`], then moves it down (or up) until its deepest pose presses
+/// `depth_m` into the surface. `tip_radius_m`: how far the tool reaches below its origin.
+///
+/// ```text
+/// room: the middle half of the object, from depth below first touch in its middle to 30 mm above that
+/// p'_z = p_z - (h + depth)      h = min over poses of (p_z - tip radius - height of the surface under p)
+/// ```
+/// One scale keeps the motion's shape, so a motion that is wide and flat would otherwise hover in the middle of the room.
+pub fn fit_above(
+    poses: &mut [TrackedPose],
+    terrain: &Terrain,
+    tip_radius_m: f64,
+    depth_m: f64,
+) -> Result<Fit, TrajectoryError> {
+    let mut done = fit(poses, room_above(terrain, tip_radius_m, depth_m))?;
+    let clearance = |pose: &TrackedPose| {
+        let [x, y, z] = pose.position_m;
+        terrain.height_m([x, y]).map(|height| z - tip_radius_m - height)
+    };
+    if let Some(lowest) = poses.iter().filter_map(clearance).reduce(f64::min) {
+        let down = lowest + depth_m;
+        poses.iter_mut().for_each(|pose| pose.position_m[2] -= down);
+        done.to_m[2] -= down;
+    }
+    Ok(done)
+}
+
+/// How deep a fitted motion presses into an object unless told otherwise, in metres: 8 mm, at most 0.3 of its height.
+pub fn fitted_depth_m(terrain: &Terrain) -> f64 {
+    let height_m = middle_top_m(terrain) - terrain.bounds().min_m[2];
+    DEPTH_M.min(DEPTH_SHARE * height_m)
+}
+
+/// The middle half of the object, from `depth_m` below first touch to `CLEARANCE_M` above it.
+fn room_above(terrain: &Terrain, tip_radius_m: f64, depth_m: f64) -> Workspace {
+    let Workspace { min_m, max_m } = terrain.bounds();
+    let quarter = |i: usize| 0.25 * (max_m[i] - min_m[i]);
+    let touch_m = middle_top_m(terrain) + tip_radius_m;
+    Workspace {
+        min_m: [min_m[0] + quarter(0), min_m[1] + quarter(1), touch_m - depth_m],
+        max_m: [max_m[0] - quarter(0), max_m[1] - quarter(1), touch_m + CLEARANCE_M],
+    }
+}
+
+/// Height of the object in its middle; its highest point where it has a hole there.
+fn middle_top_m(terrain: &Terrain) -> f64 {
+    let [x, y, _] = terrain.bounds().centre();
+    terrain.height_m([x, y]).unwrap_or(terrain.bounds().max_m[2])
+}
+
 impl Workspace {
+    /// The box around some points; none around none.
+    pub(super) fn around<'a>(points: impl IntoIterator<Item = &'a [f64; 3]>) -> Option<Self> {
+        let bounds = points.into_iter().map(|p| Self { min_m: *p, max_m: *p });
+        bounds.reduce(|a, b| Self {
+            min_m: std::array::from_fn(|i| a.min_m[i].min(b.min_m[i])),
+            max_m: std::array::from_fn(|i| a.max_m[i].max(b.max_m[i])),
+        })
+    }
+
     fn centre(&self) -> [f64; 3] {
         std::array::from_fn(|i| 0.5 * (self.min_m[i] + self.max_m[i]))
     }
@@ -78,15 +145,4 @@ fn relative(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
     ];
     let norm = product.iter().map(|c| c * c).sum::<f64>().sqrt();
     product.map(|c| c / norm)
-}
-
-fn bounds(poses: &[TrackedPose]) -> Workspace {
-    let Some(first) = poses.first() else {
-        return Workspace { min_m: [0.0; 3], max_m: [0.0; 3] };
-    };
-    let start = Workspace { min_m: first.position_m, max_m: first.position_m };
-    poses.iter().fold(start, |b, pose| Workspace {
-        min_m: std::array::from_fn(|i| b.min_m[i].min(pose.position_m[i])),
-        max_m: std::array::from_fn(|i| b.max_m[i].max(pose.position_m[i])),
-    })
 }

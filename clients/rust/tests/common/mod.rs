@@ -14,6 +14,7 @@ use plica_client::protocol::wrench::Wrench;
 use plica_client::{Client, ClientOptions};
 use serde_json::json;
 use sha2::{Digest, Sha256};
+use zenoh::qos::CongestionControl;
 use zenoh::query::Query;
 use zenoh::{Config, Session, Wait};
 
@@ -60,7 +61,7 @@ impl SmallDaemon {
                 force_n: pose.position_m,
                 ..Wrench::default()
             };
-            session.put(echo_keys.wrench(&tool), wrench.encode().to_vec()).wait().unwrap();
+            put(&session, &echo_keys.wrench(&tool), wrench.encode().to_vec());
         });
         echo.background().wait().unwrap();
         self.queryable(&keys.mesh("*"), serve_mesh);
@@ -76,6 +77,10 @@ impl SmallDaemon {
         });
     }
 
+    pub(crate) fn put(&self, key: &str, bytes: Vec<u8>) {
+        put(&self.session, key, bytes);
+    }
+
     fn queryable(&self, key: &str, answer: fn(Query)) {
         self.session.declare_queryable(key.to_owned()).callback(answer).background().wait().unwrap();
     }
@@ -85,6 +90,11 @@ impl SmallDaemon {
     }
 }
 
+/// Waits for room instead of dropping, so that a test may count what arrives.
+fn put(session: &Session, key: &str, bytes: Vec<u8>) {
+    session.put(key, bytes).congestion_control(CongestionControl::Block).wait().unwrap();
+}
+
 pub(crate) fn frame(sequence: u64) -> Vec<u8> {
     let mut bytes = Vec::new();
     let header = SkinHeader { sequence, ..SkinHeader::default() };
@@ -92,18 +102,20 @@ pub(crate) fn frame(sequence: u64) -> Vec<u8> {
     bytes
 }
 
-/// A plate of 40 x 20 mm, 10 mm high, as the smallest GLB with positions; padded so that it needs three pieces.
+/// A plate of 40 x 20 mm, 10 mm high, as the smallest GLB; padded so that it needs three pieces.
 pub(crate) fn mesh_bytes() -> Vec<u8> {
     let corners = [[0.0_f32, 0.0, 0.01], [0.04, 0.0, 0.01], [0.04, 0.02, 0.01], [0.0, 0.02, 0.0]];
     let mut binary: Vec<u8> = corners.iter().flatten().flat_map(|c| c.to_le_bytes()).collect();
+    binary.extend([0_u16, 1, 2, 0, 2, 3].iter().flat_map(|i| i.to_le_bytes()));
     binary.resize(2 * CHUNK_BYTES + 1232, 7);
     let mut text = json!({
         "asset": {"version": "2.0"},
         "buffers": [{"byteLength": binary.len()}],
-        "bufferViews": [{"buffer": 0, "byteLength": 48}],
+        "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 12}],
         "accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3",
-                       "min": [0.0, 0.0, 0.0], "max": [0.04, 0.02, 0.01]}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+                       "min": [0.0, 0.0, 0.0], "max": [0.04, 0.02, 0.01]},
+                      {"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
     })
     .to_string();
     text.extend(std::iter::repeat_n(' ', text.len().next_multiple_of(4) - text.len()));

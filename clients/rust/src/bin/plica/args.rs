@@ -84,9 +84,9 @@ pub(crate) struct Motion {
     /// Point of the surface to press on, `x,y,z`; above the middle of the object if left out.
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub(crate) at_m: Option<[f64; 3]>,
-    /// How deep to press.
-    #[arg(long, default_value_t = 0.004)]
-    pub(crate) depth_m: f64,
+    /// How deep to press [default: 0.004; with --fit 0.008, at most 0.3 of the object's height].
+    #[arg(long, value_parser = positive)]
+    pub(crate) depth_m: Option<f64>,
     /// Radius of the tool's tip.
     #[arg(long, default_value_t = 0.007)]
     pub(crate) tip_radius_m: f64,
@@ -122,7 +122,7 @@ pub(crate) struct Probe {
     /// Trajectory (CSV or TUM) to follow at its own times, in place of a pattern.
     #[arg(long, conflicts_with_all = ["pattern", "rate_hz", "seconds"])]
     pub(crate) poses: Option<PathBuf>,
-    /// Scale and move the trajectory into a box above the object; the tool starts upright.
+    /// Scale and move the trajectory so that it presses the object, as plicad's --fit does; the tool starts upright.
     #[arg(long, requires = "poses")]
     pub(crate) fit: bool,
 }
@@ -134,6 +134,9 @@ pub(crate) struct Record {
     /// Seconds to record; until Ctrl-C if left out.
     #[arg(long, value_parser = positive)]
     pub(crate) seconds: Option<f64>,
+    /// Stop after this many poses.
+    #[arg(long, value_name = "N")]
+    pub(crate) max_poses: Option<u64>,
     /// Record skin frames as well.
     #[arg(long)]
     pub(crate) skins: bool,

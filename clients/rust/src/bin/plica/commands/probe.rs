@@ -1,10 +1,11 @@
 //! `probe`: a scripted tool, or one that follows a recorded trajectory at its own times.
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use plica_client::pattern::Pattern;
-use plica_client::trajectory::{self, TrackedPose};
-use plica_client::{Client, PoseSource};
+use plica_client::trajectory::{self, TrackedPose, fit_above, fitted_depth_m};
+use plica_client::{Client, PoseSource, Subscription, WrenchMessage};
 use serde_json::json;
 
 use super::Stop;
@@ -14,17 +15,19 @@ use crate::output::{Output, progress};
 
 const UPRIGHT: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 const WRENCHES_WAITING: usize = 4096;
+/// After the last pose, how long its answer may still take.
+const LAST_ANSWER: Duration = Duration::from_millis(200);
 
 pub(crate) fn run(client: &Client, probe: &Probe, output: Output) -> anyhow::Result<()> {
     let plan = plan(client, &probe.motion)?;
     let poses = match &probe.poses {
-        Some(file) => recorded(file, probe.fit, &plan)?,
+        Some(file) => recorded(file, probe, &plan)?,
         None => scripted(&probe.motion, &plan),
     };
     let stop = Stop::on_signals()?;
     let wrenches = client.subscribe_wrenches(&plan.tool, WRENCHES_WAITING)?;
     let bar = progress(Some(poses.len() as u64), "poses");
-    let (mut published, mut peak_n, mut contacts) = (0_u64, 0.0_f64, 0_u64);
+    let (mut published, mut answers) = (0_u64, Answers::default());
     let mut sources = Sources::default();
     let start = Instant::now();
     for pose in &poses {
@@ -35,15 +38,14 @@ pub(crate) fn run(client: &Client, probe: &Probe, output: Output) -> anyhow::Res
         client.publish_pose(tool, &sources.of(tool).pose(pose.position_m, pose.orientation_xyzw))?;
         published += 1;
         bar.inc(1);
-        while let Some(message) = wrenches.try_next() {
-            peak_n = peak_n.max(norm(message.wrench.force_n));
-            contacts += u64::from(message.wrench.flags.in_contact);
-            bar.set_message(format!("{:.3} N", norm(message.wrench.force_n)));
-        }
+        answers.collect(&wrenches);
+        bar.set_message(format!("{:.3} N", answers.newest_n));
     }
-    bar.finish_and_clear();
-    let stats = wrenches.stats();
     let seconds = start.elapsed().as_secs_f64();
+    stop.sleep_until(Instant::now() + LAST_ANSWER);
+    answers.collect(&wrenches);
+    bar.finish_and_clear();
+    let (stats, Answers { peak_n, contacts, .. }) = (wrenches.stats(), answers);
     let value = json!({
         "tool": plan.tool, "poses": published, "seconds": seconds, "peak_force_n": peak_n,
         "wrenches_received": stats.received, "wrenches_missed": stats.missed, "wrenches_in_contact": contacts,
@@ -56,6 +58,24 @@ pub(crate) fn run(client: &Client, probe: &Probe, output: Output) -> anyhow::Res
     Ok(())
 }
 
+/// What came back.
+#[derive(Default)]
+struct Answers {
+    newest_n: f64,
+    peak_n: f64,
+    contacts: u64,
+}
+
+impl Answers {
+    fn collect(&mut self, wrenches: &Subscription<WrenchMessage>) {
+        while let Some(WrenchMessage { wrench, .. }) = wrenches.try_next() {
+            self.newest_n = norm(wrench.force_n);
+            self.peak_n = self.peak_n.max(self.newest_n);
+            self.contacts += u64::from(wrench.flags.in_contact);
+        }
+    }
+}
+
 /// Each tool has its own numbering.
 #[derive(Default)]
 struct Sources(std::collections::BTreeMap<String, PoseSource>);
@@ -66,10 +86,11 @@ impl Sources {
     }
 }
 
-fn recorded(file: &std::path::Path, fit: bool, plan: &Plan) -> anyhow::Result<Vec<TrackedPose>> {
+fn recorded(file: &Path, probe: &Probe, plan: &Plan) -> anyhow::Result<Vec<TrackedPose>> {
     let mut poses = trajectory::read(file)?;
-    if fit {
-        trajectory::fit(&mut poses, plan.workspace)?;
+    if probe.fit {
+        let depth_m = probe.motion.depth_m.unwrap_or_else(|| fitted_depth_m(&plan.terrain));
+        fit_above(&mut poses, &plan.terrain, probe.motion.tip_radius_m, depth_m)?;
     }
     Ok(poses)
 }
