@@ -7,9 +7,10 @@ mod common;
 use std::time::{Duration, Instant};
 
 use common::{Misbehaviour, TICKS_FOR_A_WHILE, TestServer, pose, wait_for};
-use plica_client::ClientError;
+use plica_client::protocol::pose::Pose;
 use plica_client::protocol::rpc::{SnapshotReply, StateReply, StepPose};
 use plica_client::protocol::wrench::Wrench;
+use plica_client::{Client, ClientError};
 use serde_json::{Value, json};
 use zenoh::Wait;
 
@@ -22,8 +23,9 @@ fn a_client_publishes_poses_and_receives_skin_and_wrenches() {
     let skins = client.subscribe_skin("block").unwrap();
     let wrenches = client.subscribe_wrenches("ball", 4096).unwrap();
     let rest = client.skin_now("block").unwrap().frame().unwrap().vectors();
+    let publisher = client.lossless_pose_publisher("ball").unwrap();
     for k in 1..=100 {
-        client.publish_pose("ball", &pose(5, k, 0.024)).unwrap();
+        publisher.publish(&pose(5, k, 0.024)).unwrap();
         std::thread::sleep(Duration::from_millis(4));
     }
     let pressed = skins.next(SECOND).unwrap();
@@ -38,7 +40,9 @@ fn a_client_publishes_poses_and_receives_skin_and_wrenches() {
     }
     assert!(newest.flags.in_contact && newest.force_n[2] > 0.01, "{newest:?}");
     let status = client.status().unwrap();
-    assert_eq!(status.tools["ball"].poses_accepted, 100);
+    let tool = &status.tools["ball"];
+    assert_eq!(tool.poses_accepted + tool.poses_rejected.values().sum::<u64>(), 100, "{tool:?}");
+    assert_eq!(tool.poses_rejected.keys().find(|kind| *kind != "queue_full"), None, "{tool:?}");
     assert_eq!(status.objects["block"].n_vertices as usize, rest.len());
     assert!(status.objects["block"].frames_published > 0);
     assert!(status.stages.contains_key("contact") && status.tick_us.count > 100);
@@ -50,8 +54,10 @@ fn the_mesh_comes_in_pieces_and_is_a_glb() {
     let client = server.client();
     let glb = client.mesh("block").unwrap();
     assert_eq!(&glb[..4], b"glTF");
-    let rest = plica_client::mesh::rest_positions(&glb).unwrap();
+    let (rest, triangles) = plica_client::mesh::rest_mesh(&glb).unwrap();
     assert_eq!(rest, client.skin_now("block").unwrap().frame().unwrap().vectors(), "same order, same numbers");
+    let status = client.status().unwrap();
+    assert_eq!(triangles.len(), status.objects["block"].n_triangles as usize);
     assert_eq!(refused(client.mesh("sphere")), "unknown_object");
 }
 
@@ -155,7 +161,7 @@ fn bad_poses_are_counted_by_kind_and_change_nothing() {
     ];
     binary.into_iter().for_each(|message| publisher.publish_bytes(message, false).unwrap());
     publisher.publish_bytes(b"{\"position\": [0, 0]}".to_vec(), true).unwrap();
-    client.publish_pose("drill", &pose(5, 1, 0.2)).unwrap();
+    publish(&client, "drill", &pose(5, 1, 0.2));
     let kinds = [
         "too_short",
         "bad_length",
@@ -182,7 +188,7 @@ fn bad_poses_are_counted_by_kind_and_change_nothing() {
 fn a_restarted_client_takes_over_once_the_old_one_is_stale() {
     let server = TestServer::start_with_impatient_tool();
     let client = server.client();
-    client.publish_pose("ball", &pose(1, 500, 0.2)).unwrap();
+    publish(&client, "ball", &pose(1, 500, 0.2));
     wait_for("the first source", || client.status().unwrap().tools["ball"].pose_sequence == 500);
     let mut sequence = 0;
     wait_for("the second source", || {
@@ -203,7 +209,7 @@ fn slow_frozen_and_panicking_subscribers_delay_no_tick() {
     let good = server.client();
     let frames = good.subscribe_skin("block").unwrap();
     // Touched, so that it does not fall asleep and publish twice a second only.
-    good.publish_pose("ball", &pose(1, 1, 0.024)).unwrap();
+    publish(&good, "ball", &pose(1, 1, 0.024));
     let _bad = [Misbehaviour::Sleeps, Misbehaviour::Stopped, Misbehaviour::Panics].map(|m| m.start(server.endpoint()));
     let (begin, before, received) = (Instant::now(), good.status().unwrap(), frames.stats().received);
     wait_for("ticks", || good.status().unwrap().tick > before.tick + TICKS_FOR_A_WHILE);
@@ -219,7 +225,7 @@ fn slow_frozen_and_panicking_subscribers_delay_no_tick() {
 #[test]
 fn the_daemon_stops_within_three_seconds_beside_a_stopped_client() {
     let server = TestServer::start(false);
-    server.client().publish_pose("ball", &pose(1, 1, 0.2)).unwrap();
+    publish(&server.client(), "ball", &pose(1, 1, 0.2));
     let _bad = Misbehaviour::Stopped.start(server.endpoint());
     std::thread::sleep(SECOND);
     let begin = Instant::now();
@@ -240,6 +246,11 @@ fn a_liveliness_token_stands_while_the_daemon_runs() {
     let tokens = session.liveliness().get("plica/v1/*/alive").wait().unwrap();
     let token = tokens.recv().unwrap().into_result().unwrap();
     assert_eq!(token.key_expr().as_str(), "plica/v1/main/alive");
+}
+
+/// One pose that must arrive.
+fn publish(client: &Client, tool: &str, pose: &Pose) {
+    client.lossless_pose_publisher(tool).unwrap().publish(pose).unwrap();
 }
 
 /// Code of the error that the daemon answered with.

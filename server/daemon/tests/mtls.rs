@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use plica_client::protocol::pose::Pose;
 use plica_client::{Client, ClientError, ClientOptions};
@@ -43,13 +43,19 @@ fn certificates_decide_who_may_do_what() {
         (connect("tracker").unwrap(), connect("front-end").unwrap(), connect("operator").unwrap());
 
     let pose = |sequence| Pose { sequence, position_m: [0.02, 0.02, 0.1], ..Pose::default() };
+    let (forbidden, allowed) =
+        (front_end.lossless_pose_publisher("ball").unwrap(), tracker.lossless_pose_publisher("ball").unwrap());
     for k in 1..=20 {
-        front_end.publish_pose("ball", &pose(1000 + k)).unwrap();
-        tracker.publish_pose("ball", &pose(k)).unwrap();
+        forbidden.publish(&pose(1000 + k)).unwrap();
+        allowed.publish(&pose(k)).unwrap();
         std::thread::sleep(Duration::from_millis(10));
     }
-    let status = front_end.status().unwrap();
-    let ball = &status.tools["ball"];
+    let ball = || front_end.status().unwrap().tools["ball"].clone();
+    let begin = Instant::now();
+    while ball().pose_sequence != 20 && begin.elapsed() < Duration::from_secs(10) {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let ball = ball();
     assert_eq!((ball.poses_accepted, ball.pose_sequence), (20, 20), "the tracker's poses, nobody else's");
     assert!(ball.poses_rejected.is_empty(), "{:?}", ball.poses_rejected);
 

@@ -46,7 +46,7 @@ impl PoseIntake {
         let mut tool = self.lock(tool);
         let Some(pose) = tool.gate.admit(message, now_s) else { return };
         if tool.queue.push(wire::pose_sample(&pose)).is_err() {
-            tool.gate.reject("queue_full");
+            tool.gate.turn_back("queue_full");
         }
     }
 

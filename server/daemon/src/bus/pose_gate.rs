@@ -49,8 +49,14 @@ impl PoseGate {
         Ok(())
     }
 
-    pub(super) fn reject(&mut self, kind: &str) {
+    fn reject(&mut self, kind: &str) {
         count(&mut self.rejected, kind);
+    }
+
+    /// A pose that was admitted is not used after all.
+    pub(super) fn turn_back(&mut self, kind: &str) {
+        self.accepted -= 1;
+        self.reject(kind);
     }
 
     /// The next valid pose of anyone is taken.
@@ -105,6 +111,14 @@ mod tests {
         assert!(gate.admit(Pose::decode_json(b"{"), 0.0).is_none());
         assert!(gate.admit(Pose { position_m: [f64::NAN; 3], ..pose(1, 1) }.checked(), 0.0).is_none());
         assert_eq!(rejected(&gate), [("bad_json", 1), ("non_finite", 1), ("too_short", 1)]);
+    }
+
+    #[test]
+    fn a_pose_without_room_is_rejected_and_not_accepted() {
+        let mut gate = PoseGate::new(0.2);
+        assert!(gate.admit(Ok(pose(1, 1)), 0.0).is_some());
+        gate.turn_back("queue_full");
+        assert_eq!((gate.accepted(), rejected(&gate)), (0, vec![("queue_full", 1)]));
     }
 
     #[test]

@@ -15,6 +15,10 @@ use crate::output::{Output, progress};
 /// About two seconds of everything; a full queue drops what arrives, and says so.
 const WAITING: usize = 4096;
 const LOOK: Duration = Duration::from_millis(50);
+const POSE: &str = "pose";
+
+/// Messages written, by kind.
+type Counts = BTreeMap<&'static str, u64>;
 
 pub(crate) fn run(client: &Client, record: &Record, output: Output) -> anyhow::Result<()> {
     let stop = Stop::on_signals()?;
@@ -24,11 +28,14 @@ pub(crate) fn run(client: &Client, record: &Record, output: Output) -> anyhow::R
     if client.status().is_err() {
         output.note("no plicad serves this session; recording what others publish");
     }
+    // Scripts wait for this line: the question above has travelled behind the subscription.
+    output.note(&format!("recording to {}", record.out.display()));
     let bar = progress(None, "messages");
     let start = Instant::now();
-    let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
-    let over = |now: Instant| record.seconds.is_some_and(|s| (now - start).as_secs_f64() >= s) || stop.is_set();
-    while !over(Instant::now()) {
+    let mut counts = Counts::new();
+    let late = || record.seconds.is_some_and(|s| start.elapsed().as_secs_f64() >= s);
+    let enough = |counts: &Counts| record.max_poses.is_some_and(|most| counts.get(POSE).copied().unwrap_or(0) >= most);
+    while !late() && !stop.is_set() && !enough(&counts) {
         if let Some(message) = messages.next(LOOK) {
             write(&mut recorder, message, clock, &mut counts)?;
             bar.inc(1);
@@ -36,13 +43,16 @@ pub(crate) fn run(client: &Client, record: &Record, output: Output) -> anyhow::R
     }
     // What waits at the end belongs to the recording; what goes on arriving does not.
     for message in std::iter::from_fn(|| messages.try_next()).take(WAITING) {
+        if enough(&counts) {
+            break;
+        }
         write(&mut recorder, message, clock, &mut counts)?;
     }
     recorder.finish()?;
     bar.finish_and_clear();
     let count = |kind: &str| counts.get(kind).copied().unwrap_or(0);
     let (seconds, dropped) = (start.elapsed().as_secs_f64(), messages.stats().dropped);
-    let (poses, skins, wrenches) = (count("pose"), count("skin"), count("wrench"));
+    let (poses, skins, wrenches) = (count(POSE), count("skin"), count("wrench"));
     let value = json!({
         "file": record.out, "seconds": seconds, "poses": poses, "skins": skins, "wrenches": wrenches, "dropped": dropped,
     });
@@ -61,16 +71,11 @@ fn keys(client: &Client, record: &Record) -> Vec<String> {
     wanted
 }
 
-fn write(
-    recorder: &mut Recorder,
-    message: RawMessage,
-    clock: SourceClock,
-    counts: &mut BTreeMap<&'static str, u64>,
-) -> anyhow::Result<()> {
+fn write(recorder: &mut Recorder, message: RawMessage, clock: SourceClock, counts: &mut Counts) -> anyhow::Result<()> {
     let RawMessage { key, bytes, json, received } = message;
     let kind = Kind::of(&key, json).with_context(|| format!("unexpected key `{key}`"))?;
     let name = match kind {
-        Kind::Pose | Kind::JsonPose => "pose",
+        Kind::Pose | Kind::JsonPose => POSE,
         Kind::Skin => "skin",
         Kind::Wrench => "wrench",
     };
