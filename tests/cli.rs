@@ -3,6 +3,7 @@
 
 use std::fmt::Write as _;
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::net::TcpListener;
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
@@ -111,6 +112,7 @@ fn the_schema_is_json_and_knows_the_tables() {
     for table in ["objects", "tools", "contact", "runtime"] {
         assert!(schema["properties"][table].is_object(), "no `{table}`");
     }
+    assert_eq!(last_line(&plicad(&["schema", "--json"])), schema);
 }
 
 /// Wedge with one line changed: what was typed, what it becomes, and what the message must say.
@@ -166,6 +168,32 @@ fn bad_pose_files_are_named() {
         let message = run(&format!("{header}{rows}"));
         assert!(message.contains("poses.csv") && message.contains(expected), "`{expected}` in: {message}");
         assert!(!out.exists(), "nothing is written for a bad pose file: {rows}");
+    }
+}
+
+#[test]
+fn with_json_a_refusal_is_an_object_on_standard_output_too() {
+    let folder = TempDir::new().unwrap();
+    let scene = folder.path().join("scene.toml");
+    fs::write(&scene, "[objects").unwrap();
+    let scene = scene.to_str().unwrap();
+    let cases: [(&[&str], i32, &str); 6] = [
+        (&["check", scene], 1, "scene.toml:1"),
+        (&["bench", "no/such.toml"], 1, "no/such.toml"),
+        (&["serve", scene], 1, "scene.toml:1"),
+        (&["demo", "--seconds", "0"], 1, "--seconds"),
+        (&["simulate", "wedge", "--poses", "none.csv", "--out", "none.safetensors"], 1, "none.csv"),
+        (&["bench", "wedge", "--ticks", "many"], 2, "--ticks"),
+    ];
+    for (arguments, status, expected) in cases {
+        let output = plicad(&[arguments, &["--json"]].concat());
+        let (text, errors) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        assert_eq!(output.status.code(), Some(status), "{arguments:?}: {errors}");
+        let said: Value = serde_json::from_str(text.lines().last().unwrap()).unwrap();
+        let message = said["error"]["message"].as_str().unwrap();
+        assert!(message.contains(expected) && errors.contains(expected), "`{expected}` in: {said}; {errors}");
+        let without = plicad(arguments);
+        assert!(without.stdout.is_empty(), "{arguments:?}: {}", String::from_utf8_lossy(&without.stdout));
     }
 }
 
@@ -264,21 +292,35 @@ fn a_recording_replayed_and_recorded_again_holds_the_same_poses() {
     let daemon = Daemon::start();
     let folder = TempDir::new().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let record = |file: &str| {
+    // Until Ctrl-C, or so many poses, or a minute.
+    let record = |file: &str, n_poses: &str| {
         let mut command = Command::new(program("plica"));
-        command.args(["record", file, "--seconds", "5", "--connect", &daemon.endpoint, "--json"]);
-        let recorder = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-        std::thread::sleep(Duration::from_millis(2000)); // it connects and subscribes
+        command.args([
+            "record",
+            file,
+            "--max-poses",
+            n_poses,
+            "--seconds",
+            "60",
+            "--connect",
+            &daemon.endpoint,
+            "--json",
+        ]);
+        let mut recorder = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut notes = BufReader::new(recorder.stderr.as_mut().unwrap()).lines();
+        assert!(notes.any(|line| line.unwrap().contains("recording to")), "the recorder ended early");
         recorder
     };
-    let recorder = record(&path("1.mcap"));
+    let recorder = record(&path("1.mcap"), "250");
     let sent = daemon.ask(&["probe", "--seconds", "1", "--rate-hz", "250"]);
+    assert_eq!(sent["poses"], 250);
+    let _ = Command::new("kill").args(["-INT", &recorder.id().to_string()]).output();
     let first = last_line(&recorder.wait_with_output().unwrap());
-    let recorder = record(&path("2.mcap"));
+    // What is sent live may be dropped on a busy machine; what is replayed may not.
+    let n_poses = first["poses"].as_u64().unwrap();
+    assert!((1..=250).contains(&n_poses), "{first}");
+    let recorder = record(&path("2.mcap"), &n_poses.to_string());
     daemon.ask(&["replay", &path("1.mcap")]);
     let second = last_line(&recorder.wait_with_output().unwrap());
-    // What is sent live may be dropped on a busy machine; what is replayed may not.
-    let count = |v: &Value| v["poses"].as_f64().unwrap();
-    assert!(count(&first) > 0.9 * count(&sent), "{first}");
     assert_eq!(first["poses"], second["poses"], "{second}");
 }

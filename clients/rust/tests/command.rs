@@ -29,10 +29,11 @@ fn poses(path: &Path) -> Vec<Recorded> {
     read(path).unwrap().map(Result::unwrap).collect()
 }
 
-/// Starts `plica record` and waits until it has subscribed.
-fn record(daemon: &SmallDaemon, path: &Path, seconds: &str) -> Child {
+/// Starts `plica record` for a number of poses, or a minute if they never come, and waits until it has subscribed.
+fn record(daemon: &SmallDaemon, path: &Path, n_poses: &str) -> Child {
     let path = path.to_str().unwrap();
-    let child = plica(&["record", path, "--seconds", seconds, "--connect", &daemon.endpoint]).spawn().unwrap();
+    let until = ["--max-poses", n_poses, "--seconds", "60", "--connect", &daemon.endpoint];
+    let child = plica(&["record", path]).args(until).spawn().unwrap();
     let deadline = Instant::now() + Duration::from_secs(10);
     let publisher = zenoh::Wait::wait(daemon.session.declare_publisher("plica/v1/main/tool/left/pose")).unwrap();
     let listens = || zenoh::Wait::wait(publisher.matching_status()).unwrap().matching();
@@ -54,23 +55,26 @@ fn record_replay_record_gives_the_same_poses() {
     let folder = TempDir::new().unwrap();
     let (first, second) = (folder.path().join("1.mcap"), folder.path().join("2.mcap"));
 
-    let recorder = record(&daemon, &first, "2");
+    let recorder = record(&daemon, &first, "400");
     let client = daemon.client();
     let (mut left, mut right) = (PoseSource::new(), PoseSource::new());
+    let to = |tool: &str| client.lossless_pose_publisher(tool).unwrap();
+    let (to_left, to_right) = (to("left"), to("right"));
     for n in 0..200 {
         let at = f64::from(n) * 1e-3;
-        client.publish_pose("left", &left.pose([at, 0.1, 0.2], [0.0, 0.0, 0.0, 0.999])).unwrap();
-        client.publish_pose("right", &right.pose([at / 3.0, 0.0, 0.0], [0.0, 0.0, 0.6, 0.8])).unwrap();
+        to_left.publish(&left.pose([at, 0.1, 0.2], [0.0, 0.0, 0.0, 0.999])).unwrap();
+        to_right.publish(&right.pose([at / 3.0, 0.0, 0.0], [0.0, 0.0, 0.6, 0.8])).unwrap();
         std::thread::sleep(Duration::from_millis(2));
     }
     let result = last_line(&recorder.wait_with_output().unwrap());
     assert_eq!((&result["poses"], &result["dropped"]), (&400.into(), &0.into()), "{result}");
 
-    let recorder = record(&daemon, &second, "2");
+    let recorder = record(&daemon, &second, "400");
     let path = first.to_str().unwrap();
     let replay = plica(&["replay", path, "--speed", "2", "--connect", &daemon.endpoint]).output().unwrap();
     assert_eq!(last_line(&replay)["poses"], 400, "{}", String::from_utf8_lossy(&replay.stderr));
-    recorder.wait_with_output().unwrap();
+    let result = last_line(&recorder.wait_with_output().unwrap());
+    assert_eq!((&result["poses"], &result["dropped"]), (&400.into(), &0.into()), "{result}");
 
     let (first, second) = (poses(&first), poses(&second));
     assert_eq!((first.len(), second.len()), (400, 400));
@@ -83,7 +87,7 @@ fn record_replay_record_gives_the_same_poses() {
 fn a_missing_daemon_is_named_with_what_to_do() {
     let output = plica(&["status", "--connect", "tcp/127.0.0.1:9"]).output().unwrap();
     assert!(!output.status.success());
-    let error = last_line(&output)["error"].as_str().unwrap().to_owned();
+    let error = last_line(&output)["error"]["message"].as_str().unwrap().to_owned();
     assert!(error.starts_with("no plicad answered on tcp/127.0.0.1:9: start one with `plicad serve`"), "{error}");
 }
 
@@ -93,8 +97,10 @@ fn status_and_rpc_print_one_object() {
     let ask = |arguments: &[&str]| last_line(&plica(arguments).args(["--connect", &daemon.endpoint]).output().unwrap());
     assert_eq!(ask(&["status"])["scene"], "small");
     assert_eq!(ask(&["rpc", "step", r#"{"ticks": 3}"#])["tick"], 3);
-    assert!(ask(&["rpc", "explode"])["error"].as_str().unwrap().starts_with("rpc_unknown: no method `explode`"));
-    assert!(ask(&["rpc", "step", "{ticks}"])["error"].as_str().unwrap().contains("is not JSON"));
+    let refused = &ask(&["rpc", "explode"])["error"];
+    assert!(refused["message"].as_str().unwrap().starts_with("rpc_unknown: no method `explode`"), "{refused}");
+    assert_eq!((&refused["code"], &refused["retryable"]), (&"rpc_unknown".into(), &false.into()));
+    assert!(ask(&["rpc", "step", "{ticks}"])["error"]["message"].as_str().unwrap().contains("is not JSON"));
 }
 
 #[test]
@@ -109,7 +115,8 @@ fn probe_latency_and_export() {
     assert!((0.03..0.06).contains(&peak), "{result}");
 
     let result = ask(&[["latency"].as_slice(), short.as_slice()].concat());
-    assert_eq!(result["echoed"], 20, "{result}");
+    // Streams may drop; an echo that came is counted once.
+    assert!((1..=20).contains(&result["echoed"].as_u64().unwrap()), "{result}");
     let p50_us = result["motion_to_force_us"]["p50"].as_f64().unwrap();
     assert!(p50_us > 1.0 && p50_us < 1e6, "{result}");
 
@@ -119,7 +126,12 @@ fn probe_latency_and_export() {
     assert_eq!(std::fs::read(mesh).unwrap(), common::mesh_bytes());
     assert_eq!(std::fs::read(skin).unwrap(), common::frame(7));
 
-    assert!(ask(&["probe", "--tool", "knife"])["error"].as_str().unwrap().contains("no tool `knife`; it has: probe"));
+    assert!(
+        ask(&["probe", "--tool", "knife"])["error"]["message"]
+            .as_str()
+            .unwrap()
+            .contains("no tool `knife`; it has: probe")
+    );
 }
 
 #[test]
@@ -134,5 +146,5 @@ fn probe_follows_a_trajectory() {
     assert_eq!(result["poses"], 3, "{result}");
     assert!(result["seconds"].as_f64().unwrap() >= 0.2, "{result}");
     assert!(result["peak_force_n"].as_f64().unwrap() < 0.06, "{result}");
-    assert!(ask(&["probe", "--poses", "none.csv"])["error"].as_str().unwrap().starts_with("none.csv: "));
+    assert!(ask(&["probe", "--poses", "none.csv"])["error"]["message"].as_str().unwrap().starts_with("none.csv: "));
 }

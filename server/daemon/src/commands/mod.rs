@@ -20,7 +20,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Simulate(args) => simulate::run(args, cli.json),
         Command::Bench(args) => bench::run(args, cli.json),
         Command::Check(args) => check::run(args, cli.json),
-        Command::Schema => schema::run(),
+        Command::Schema => schema::run(cli.json),
     }
 }
 

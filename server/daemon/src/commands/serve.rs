@@ -27,10 +27,11 @@ pub fn run(args: &ServeArgs, json: bool) -> anyhow::Result<()> {
     let outcome = wait(&server, &mut signals);
     server.stop();
     tracing::info!("stopped");
+    outcome?;
     if json {
-        println!("{}", serde_json::json!({ "scene": config.name(), "stopped": outcome.is_ok() }));
+        println!("{}", serde_json::json!({ "scene": config.name(), "stopped": true }));
     }
-    outcome
+    Ok(())
 }
 
 fn wait(server: &Server, signals: &mut Signals) -> anyhow::Result<()> {

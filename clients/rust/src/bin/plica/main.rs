@@ -13,7 +13,10 @@ use commands::{ask, export, latency, probe, record, replay};
 use output::Output;
 
 fn main() -> ExitCode {
-    let args = Args::parse();
+    let args = match Args::try_parse() {
+        Ok(args) => args,
+        Err(answer) => return Output::say(&answer),
+    };
     let output = Output { json: args.common.json };
     match run(&args, output) {
         Ok(()) => ExitCode::SUCCESS,

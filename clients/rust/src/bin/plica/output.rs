@@ -1,8 +1,10 @@
 //! What a person and what a program reads.
 
+use std::process::ExitCode;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use plica_client::ClientError;
 use serde_json::{Value, json};
 
 /// Text for people, or one JSON object as the last line of standard output; never both on standard output.
@@ -21,12 +23,28 @@ impl Output {
         }
     }
 
-    /// The end of a command that failed.
+    /// The end of a command that failed; with the code, if the daemon refused.
     pub(crate) fn error(self, error: &anyhow::Error) {
         eprintln!("plica: {error:#}");
-        if self.json {
-            println!("{}", json!({"error": format!("{error:#}")}));
+        if !self.json {
+            return;
         }
+        let mut object = json!({"message": format!("{error:#}")});
+        if let Some(ClientError::Refused(reply)) = error.downcast_ref() {
+            object["code"] = reply.code.as_str().into();
+            object["retryable"] = reply.retryable.into();
+        }
+        println!("{}", json!({"error": object}));
+    }
+
+    /// Help, the version, or what is wrong with the arguments.
+    pub(crate) fn say(answer: &clap::Error) -> ExitCode {
+        // Without standard output or error there is nothing left to say.
+        let _ = answer.print();
+        if answer.use_stderr() && std::env::args_os().any(|argument| argument == "--json") {
+            println!("{}", json!({"error": {"message": answer.to_string().trim()}}));
+        }
+        ExitCode::from(u8::try_from(answer.exit_code()).unwrap_or(1))
     }
 
     /// A note that is not the result.
