@@ -28,6 +28,9 @@ const IMPULSE_TOLERANCE: f32 = 1e-4;
 const MAX_PRESS_CELLS: f32 = 4.0;
 /// One step sets out to resolve no more penetration than this share of a cell.
 const MAX_CORRECTION_CELLS: f32 = 0.1;
+/// No node gets faster [m/s]: several times what a hand or a free ring-down reaches, and a bound on what a tool that is
+/// forced through the object can fling.
+const MAX_NODE_SPEED: f32 = 10.0;
 /// Contacts are looked for no farther than this many cells away.
 const MAX_REACH_CELLS: f32 = 2.0;
 
@@ -269,12 +272,15 @@ fn multiply(
     coupling.add_product(rows, motions, h, p, out);
 }
 
-/// `v += dv`, `x += h v`
+/// `v += dv`, `x += h v`; nodes faster than [`MAX_NODE_SPEED`] are slowed to it.
 fn advance(model: &Model, state: &mut State, workspace: &Workspace) {
     let nodes = state.u.iter_mut().zip(&mut state.v).zip(&workspace.dv);
     for ((u, v), dv) in nodes.take(model.n_free) {
+        let faster: [f32; 3] = std::array::from_fn(|k| v[k] + dv[k]);
+        let speed = faster.iter().map(|c| c * c).sum::<f32>().sqrt();
+        let share = if speed > MAX_NODE_SPEED { MAX_NODE_SPEED / speed } else { 1.0 };
         for k in 0..3 {
-            v[k] += dv[k];
+            v[k] = faster[k] * share;
             u[k] = model.dt.mul_add(v[k], u[k]);
         }
     }
