@@ -19,6 +19,9 @@ pub enum Refusal {
 }
 
 impl Refusal {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Invalid, Self::Repeated, Self::OutOfOrder, Self::Conflict];
+
     /// The counter of the status message.
     pub fn kind(self) -> &'static str {
         match self {

@@ -10,6 +10,13 @@ use serde::{Deserialize, Serialize};
 /// Counters by kind of event.
 pub type Counters = BTreeMap<String, u64>;
 
+/// Counter of a tool: a pose was good, but too many were waiting for the next tick.
+pub const QUEUE_FULL: &str = "queue_full";
+/// Counter of the daemon: a question got no answer, because too many answers were waiting.
+pub const REPLY_DROPPED: &str = "reply_dropped";
+/// Counter of the daemon: a skin frame was not published, because it was not finite.
+pub const FRAME_REFUSED: &str = "frame_refused";
+
 /// What the daemon says about itself.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]

@@ -1,11 +1,13 @@
 //! Keys, requests, chunks and status as they appear on the bus.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
+use plica_protocol::DecodeError;
 use plica_protocol::chunk::{CHUNK_BYTES, ChunkHeader, offset_of, piece};
 use plica_protocol::keys::{Keys, check_name, is_wildcard};
+use plica_protocol::order::Refusal;
 use plica_protocol::pose::Pose;
 use plica_protocol::rpc::*;
-use plica_protocol::status::Status;
+use plica_protocol::status::{FRAME_REFUSED, QUEUE_FULL, REPLY_DROPPED, Status};
 
 #[test]
 fn keys_are_those_of_the_page() {
@@ -114,5 +116,17 @@ fn status_reads_older_and_newer_daemons() {
     assert_eq!(serde_json::from_str::<Status>(&json).unwrap(), Status::default());
     for key in ["\"scheduling\":\"normal\"", "\"tick_us\":{\"count\":0", "\"jobs\":[]", "\"drops\":{\"wrenches\":0"] {
         assert!(json.contains(key), "{key} in {json}");
+    }
+}
+
+#[test]
+fn the_page_names_every_counter_and_every_code() {
+    let page = include_str!("../PROTOCOL.md");
+    let refusals = Refusal::ALL.map(Refusal::kind);
+    let codes = ErrorCode::ALL.map(ErrorCode::name);
+    let others = [QUEUE_FULL, REPLY_DROPPED, FRAME_REFUSED];
+    for name in [DecodeError::KINDS.as_slice(), &refusals, &codes, &others].concat() {
+        let in_a_table = |line: &str| line.starts_with('|') && line.contains(&format!("`{name}`"));
+        assert!(page.lines().any(in_a_table), "no table of PROTOCOL.md has `{name}`");
     }
 }

@@ -4,6 +4,7 @@
 
 mod common;
 
+use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use common::{Misbehaviour, TICKS_FOR_A_WHILE, TestServer, pose, wait_for};
@@ -59,6 +60,23 @@ fn the_mesh_comes_in_pieces_and_is_a_glb() {
     let status = client.status().unwrap();
     assert_eq!(triangles.len(), status.objects["block"].n_triangles as usize);
     assert_eq!(refused(client.mesh("sphere")), "unknown_object");
+}
+
+#[test]
+fn the_status_has_the_keys_of_the_page() {
+    let page = include_str!("../../../protocol/PROTOCOL.md");
+    let example = page.split("```json").find(|block| block.contains("\"versions\"")).unwrap();
+    let example: Value = serde_json::from_str(example.split("```").next().unwrap()).unwrap();
+    let server = TestServer::start(false);
+    let status = server.client().status_json().unwrap();
+    assert_eq!(key_paths(&status, ""), key_paths(&example, ""));
+}
+
+/// Paths of all keys; names that a scene chooses are `*`, counters are left out.
+fn key_paths(value: &Value, path: &str) -> BTreeSet<String> {
+    let Some(map) = value.as_object().filter(|_| !path.ends_with("rejected")) else { return [path.to_owned()].into() };
+    let named = ["/objects", "/tools"].contains(&path);
+    map.iter().flat_map(|(key, value)| key_paths(value, &format!("{path}/{}", if named { "*" } else { key }))).collect()
 }
 
 #[test]

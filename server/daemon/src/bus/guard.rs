@@ -3,6 +3,8 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
+use plica_protocol::rpc::ErrorCode;
+
 use super::counters::SharedCounters;
 
 /// A callback that never unwinds into Zenoh, where a panic would end reception from that client for good. A caught
@@ -14,7 +16,7 @@ pub(super) fn guarded<T>(
     let counters = Arc::clone(counters);
     move |value| {
         if catch_unwind(AssertUnwindSafe(|| callback(value))).is_err() {
-            counters.count("internal");
+            counters.count(ErrorCode::Internal.name());
         }
     }
 }

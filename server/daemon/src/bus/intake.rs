@@ -6,7 +6,7 @@ use std::time::Instant;
 use plica_protocol::DecodeError;
 use plica_protocol::pose::Pose;
 use plica_protocol::rpc::{ErrorCode, ErrorReply, StepPose};
-use plica_protocol::status::Counters;
+use plica_protocol::status::{Counters, QUEUE_FULL};
 use plica_sim::{PoseSample, ToolPose};
 
 use super::Scene;
@@ -46,7 +46,7 @@ impl PoseIntake {
         let mut tool = self.lock(tool);
         let Some(pose) = tool.gate.admit(message, now_s) else { return };
         if tool.queue.push(wire::pose_sample(&pose)).is_err() {
-            tool.gate.turn_back("queue_full");
+            tool.gate.turn_back(QUEUE_FULL);
         }
     }
 

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use plica_protocol::ENCODING_JSON;
 use plica_protocol::rpc::ErrorReply;
+use plica_protocol::status::REPLY_DROPPED;
 use zenoh::Wait;
 use zenoh::bytes::Encoding;
 use zenoh::query::Query;
@@ -51,7 +52,7 @@ impl Replies {
             self.shared.counters.count(&error.code);
         }
         if self.queue.try_send(Answer { query, content }).is_err() {
-            self.shared.counters.count("reply_dropped");
+            self.shared.counters.count(REPLY_DROPPED);
         }
     }
 }

@@ -8,6 +8,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use plica_protocol::rpc::{ErrorCode, ErrorReply};
+use plica_protocol::status::FRAME_REFUSED;
 use plica_protocol::{ENCODING_BYTES, skin};
 use zenoh::Wait;
 use zenoh::bytes::Encoding;
@@ -138,7 +139,7 @@ impl Worker {
         self.due = frame.due;
         let sequence = self.published.frames.load(Relaxed) + 1;
         let Some(bytes) = self.encoder.encode(frame, sequence) else {
-            self.shared.counters.count("frame_refused");
+            self.shared.counters.count(FRAME_REFUSED);
             return;
         };
         self.published.frames.store(sequence, Relaxed);

@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use plica_protocol::status::{Drops, ObjectStatus, Status, ToolStatus};
+use plica_protocol::status::{Drops, ObjectStatus, REPLY_DROPPED, Status, ToolStatus};
 use plica_protocol::{ENCODING_JSON, VERSION};
 use plica_sim::Stage;
 use triple_buffer::Output;
@@ -48,7 +48,7 @@ pub(super) fn start(
     let counters = Arc::clone(&shared.counters);
     let callback = guarded(&shared.counters, move |query: Query| {
         if questions_in.try_send(query).is_err() {
-            counters.count("reply_dropped");
+            counters.count(REPLY_DROPPED);
         }
     });
     let queryable = shared.session.declare_queryable(shared.keys.status()).callback(callback);
