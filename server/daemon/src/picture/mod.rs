@@ -76,13 +76,15 @@ fn panels(look: &Look<'_>) -> [Panel; 3] {
     let size = (max - min).norm();
     let rect = |x, y, w, h| Rect { x, y, w, h }.times(OVERSAMPLING);
     let (main, section, above) = (rect(0, 0, 1060, 900), rect(1080, 90, 500, 360), rect(1080, 520, 500, 350));
+    // What the main view shows ends below the caption and above the legend.
+    let between_texts = rect(0, 96, 1060, 710);
     let eye = centre + size * Vector3::new(-0.62, -1.45, 1.12);
     let target = centre + Vector3::new(0.02 * size, 0.0, 0.01 * size);
     let along_x = (max.x - min.x) * 1.12;
     let (y, up) = (Vector3::y(), Vector3::z());
     let section_centre = Point3::new(centre.x, look.subject.focus.y, centre.z + 0.18 * (max.x - min.x));
     [
-        Panel { rect: main, camera: Camera::perspective(eye, target, 0.53, &main), cut_y: None },
+        Panel { rect: between_texts, camera: Camera::perspective(eye, target, 0.53, &main), cut_y: None },
         Panel {
             rect: section,
             camera: Camera::orthographic(section_centre, y, up, along_x, &section),

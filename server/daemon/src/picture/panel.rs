@@ -17,6 +17,8 @@ const GRID_M: f32 = 0.01;
 const GRID_LINE_M: f32 = 1.7e-4;
 /// How much of what is behind a tool it hides.
 const TOOL_OPACITY: f32 = 0.72;
+/// Rows of samples over which a tool fades out at a view's upper end.
+const TOOL_FADE: f32 = 120.0;
 
 /// A view and where it goes.
 #[derive(Debug, Clone)]
@@ -97,7 +99,7 @@ fn draw_outline(canvas: &mut Canvas, look: &Look<'_>, panel: &Panel) {
     }
 }
 
-/// Tools let the dent shine through: their nearest surface is mixed over the skin.
+/// Tools let the dent shine through: their nearest surface is mixed over the skin. Long ones end in a fade.
 fn draw_tool(canvas: &mut Canvas, panel: &Panel, tool: &ToolMesh) {
     let mut layer: HashMap<usize, (f32, Linear)> = HashMap::new();
     for t in &tool.triangles {
@@ -116,7 +118,10 @@ fn draw_tool(canvas: &mut Canvas, panel: &Panel, tool: &ToolMesh) {
         });
     }
     for (pixel, (_, steel)) in layer {
-        canvas.colours[pixel] = colour::mix(canvas.colours[pixel], steel, TOOL_OPACITY);
+        let below_end = pixel as f32 / canvas.w as f32 - panel.rect.y as f32;
+        let t = (below_end / TOOL_FADE).min(1.0);
+        let share = TOOL_OPACITY * t * t * (3.0 - 2.0 * t);
+        canvas.colours[pixel] = colour::mix(canvas.colours[pixel], steel, share);
     }
 }
 
