@@ -78,7 +78,7 @@ fn a_mesh_in_pieces_is_checked() {
     let glb = client.mesh("wedge").unwrap();
     assert_eq!(glb, mesh_bytes());
     assert_eq!(rest_positions(&glb).unwrap()[1], [0.04, 0.0, 0.01]);
-    assert_eq!(rest_mesh(&glb).unwrap().1, [[0, 1, 2], [0, 2, 3]]);
+    assert_eq!(rest_mesh(&glb).unwrap().triangles, [[0, 1, 2], [0, 2, 3]]);
     assert!(rest_positions(b"glTF").is_err());
     assert!(matches!(client.mesh("broken"), Err(ClientError::Checksum { .. })));
 }

@@ -55,10 +55,14 @@ fn the_mesh_comes_in_pieces_and_is_a_glb() {
     let client = server.client();
     let glb = client.mesh("block").unwrap();
     assert_eq!(&glb[..4], b"glTF");
-    let (rest, triangles) = plica_client::mesh::rest_mesh(&glb).unwrap();
-    assert_eq!(rest, client.skin_now("block").unwrap().frame().unwrap().vectors(), "same order, same numbers");
+    let mesh = plica_client::mesh::rest_mesh(&glb).unwrap();
+    assert_eq!(
+        mesh.positions_m,
+        client.skin_now("block").unwrap().frame().unwrap().vectors(),
+        "same order, same numbers"
+    );
     let status = client.status().unwrap();
-    assert_eq!(triangles.len(), status.objects["block"].n_triangles as usize);
+    assert_eq!(mesh.triangles.len(), status.objects["block"].n_triangles as usize);
     assert_eq!(refused(client.mesh("sphere")), "unknown_object");
 }
 

@@ -25,8 +25,8 @@ pub(crate) fn plan(client: &Client, motion: &Motion) -> anyhow::Result<Plan> {
     let status = client.status()?;
     let tool = choose("tool", motion.tool.as_deref(), &status.tools)?;
     let object = choose("object", motion.object.as_deref(), &status.objects)?;
-    let (positions, triangles) = rest_mesh(&client.mesh(&object)?).context("the daemon's mesh cannot be read")?;
-    let terrain = Terrain::new(&positions, &triangles).context("the object has no triangles")?;
+    let mesh = rest_mesh(&client.mesh(&object)?).context("the daemon's mesh cannot be read")?;
+    let terrain = Terrain::new(&mesh.positions_m, &mesh.triangles).context("the object has no triangles")?;
     let path = Path {
         surface_m: motion.at_m.unwrap_or_else(|| surface_above_middle(&terrain)),
         tip_radius_m: motion.tip_radius_m,
