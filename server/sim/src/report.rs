@@ -30,7 +30,8 @@ pub struct TickReport {
 pub struct ToolReading {
     /// Whether a pose was ever received; an absent tool touches nothing.
     pub present: bool,
-    /// Force on the tool \[N\]. With a spring coupling: the bounded force that the device should display.
+    /// Force on the tool \[N\]. With a spring coupling: the bounded force that the device should
+    /// display, which is zero while nothing is touched.
     pub force_n: Vector3<f64>,
     /// Torque on the tool about the proxy's origin \[N m\].
     pub torque_n_m: Vector3<f64>,

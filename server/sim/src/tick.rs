@@ -123,7 +123,8 @@ fn gate_output(model: &Model, state: &mut State, workspace: &mut Workspace, repo
     model.embedding.apply(&state.u, &mut state.skin);
 }
 
-/// What each tool feels: with a spring the bounded coupling force, else the contact forces.
+/// What each tool feels: with a spring the bounded coupling force while it touches, else the contact forces. What drags a
+/// proxy through free air (its inertia, and the steps of a slow tracker) is nothing that a hand should feel.
 fn write_readings(model: &Model, input: &TickInput<'_>, state: &mut State, workspace: &Workspace) {
     for (index, tool) in model.description.tools.iter().enumerate() {
         let (track, proxy) = (&state.tracks[index], &state.proxies[index]);
@@ -140,6 +141,7 @@ fn write_readings(model: &Model, input: &TickInput<'_>, state: &mut State, works
         reading.contact_force_n = force;
         (reading.force_n, reading.torque_n_m) = match &tool.coupling {
             Coupling::Rigid => (force, torque),
+            Coupling::Spring(_) if n_contacts == 0 => (Vector3::zeros(), Vector3::zeros()),
             Coupling::Spring(spring) => {
                 let f = -proxy.coupling_force;
                 (f.fixed_rows::<3>(0).into(), f.fixed_rows::<3>(3) * spring.lever_m)

@@ -17,6 +17,8 @@ const UPRIGHT: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 const WRENCHES_WAITING: usize = 4096;
 /// After the last pose, how long its answer may still take.
 const LAST_ANSWER: Duration = Duration::from_millis(200);
+/// Without a wrench for this long, the probe asks whether the daemon is still there.
+const SILENCE: Duration = Duration::from_secs(1);
 
 pub(crate) fn run(client: &Client, probe: &Probe, output: Output) -> anyhow::Result<()> {
     let plan = plan(client, &probe.motion)?;
@@ -30,6 +32,7 @@ pub(crate) fn run(client: &Client, probe: &Probe, output: Output) -> anyhow::Res
     let (mut published, mut answers) = (0_u64, Answers::default());
     let mut sources = Sources::default();
     let start = Instant::now();
+    let mut answered = Instant::now();
     for pose in &poses {
         if !stop.sleep_until(start + Duration::from_secs_f64(pose.time_s.max(0.0))) {
             break;
@@ -38,7 +41,16 @@ pub(crate) fn run(client: &Client, probe: &Probe, output: Output) -> anyhow::Res
         client.publish_pose(tool, &sources.of(tool).pose(pose.position_m, pose.orientation_xyzw))?;
         published += 1;
         bar.inc(1);
+        let before = wrenches.stats().received;
         answers.collect(&wrenches);
+        if wrenches.stats().received > before {
+            answered = Instant::now();
+        }
+        if answered.elapsed() > SILENCE {
+            // A paused daemon is silent too; one that is gone does not say so either.
+            client.status()?;
+            answered = Instant::now();
+        }
         bar.set_message(format!("{:.3} N", answers.newest_n));
     }
     let seconds = start.elapsed().as_secs_f64();
