@@ -40,7 +40,7 @@ pub struct TrackedPose {
 #[derive(Debug, Error)]
 pub enum TrajectoryError {
     /// The file cannot be read.
-    #[error("{} cannot be read", path.display())]
+    #[error("{}: cannot be read", path.display())]
     Io {
         /// The file.
         path: PathBuf,

@@ -40,7 +40,7 @@ pub(crate) fn run(client: &Client, replay: &Replay, output: Output) -> anyhow::R
     bar.finish_and_clear();
     let seconds = start.elapsed().as_secs_f64();
     if new_source.is_none() {
-        eprintln!("a daemon that has seen these poses counts them as repeated; --new-source plays them as new ones");
+        output.note("a daemon that has seen these poses counts them as repeated; --new-source plays them as new ones");
     }
     let value = json!({"file": replay.file, "poses": published, "tools": publishers.len(), "seconds": seconds});
     let text = format!("{published} poses of {} tool(s) in {seconds:.1} s", publishers.len());
