@@ -6,8 +6,8 @@
 use nalgebra::{Isometry3, Vector6};
 
 use crate::contact::{
-    ContactCoupling, Placement, ProxyMotion, Rows, Selection, V3, at_arm, contact_point, evaluate, predict_secant,
-    settle, stack_forces,
+    ContactCoupling, Placement, ProxyMotion, Rows, Search, Selection, V3, at_arm, contact_point, evaluate,
+    predict_secant, settle, stack_forces,
 };
 use crate::lanes::Node;
 use crate::model::Model;
@@ -28,7 +28,7 @@ const IMPULSE_TOLERANCE: f32 = 1e-4;
 const MAX_PRESS_CELLS: f32 = 4.0;
 /// One step sets out to resolve no more penetration than this share of a cell.
 const MAX_CORRECTION_CELLS: f32 = 0.1;
-/// No node gets faster [m/s]: several times what a hand or a free ring-down reaches, and a bound on what a tool that is
+/// No node gets faster \[m/s\]: several times what a hand or a free ring-down reaches, and a bound on what a tool that is
 /// forced through the object can fling.
 const MAX_NODE_SPEED: f32 = 10.0;
 /// Contacts are looked for no farther than this many cells away.
@@ -146,7 +146,8 @@ fn find_contacts(model: &Model, state: &State, workspace: &mut Workspace, report
         let motion = (speed * model.dt + skin_motion).min(MAX_REACH_CELLS * model.cell_size);
         let placement = workspace.placements[body];
         let reach = options.activation_gap_m as f32 + motion;
-        let candidates = workspace.detector.find(&model.surface, &state.skin, solid, &placement, reach);
+        let search = Search { surface: &model.surface, skin: &state.skin, solid, placement: &placement, reach };
+        let candidates = workspace.detector.find(&search);
         let friction = model.description.tools.get(body).map_or(options.plane_friction, |t| t.friction);
         let selection = Selection {
             body: body as u32,
@@ -166,7 +167,7 @@ fn find_contacts(model: &Model, state: &State, workspace: &mut Workspace, report
         report.dropped_contacts += workspace.rows.select(&model.embedding, &state.v, candidates, velocity, &selection);
         let touches = workspace.rows.rows[first_row..].iter().any(|r| r.contact.normal_force > 0.0 || r.gap <= 0.0);
         if let Some(point) = workspace.contact_points.get_mut(body).filter(|_| touches) {
-            *point = contact_point(&model.surface, &state.skin, &workspace.detector, solid, &placement);
+            *point = contact_point(&search, &workspace.detector);
         }
     }
     predict_rows(model, &mut workspace.rows, &workspace.motions);

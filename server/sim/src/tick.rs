@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::TickInput;
+use crate::contact::Search;
 use crate::description::Coupling;
 use crate::model::Model;
 use crate::probe::{Probe, Stage};
@@ -85,7 +86,9 @@ fn any_tool_is_near(model: &Model, state: &State, workspace: &mut Workspace) -> 
         let (proxy, solid) = (&state.proxies[index], &model.solids[index]);
         let moves = (target.pose.translation.vector - proxy.pose.translation.vector).norm() as f32;
         let placement = crate::step::placement(&proxy.pose);
-        workspace.detector.is_near(&model.surface, &state.skin, solid, &placement, moves + model.cell_size)
+        let reach = moves + model.cell_size;
+        let search = Search { surface: &model.surface, skin: &state.skin, solid, placement: &placement, reach };
+        workspace.detector.is_near(&search)
     })
 }
 

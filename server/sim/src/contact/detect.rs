@@ -35,6 +35,26 @@ pub(crate) struct Candidate {
     pub(crate) gap: f32,
 }
 
+/// Where to look: the skin, a placed body, and how far from it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Search<'a> {
+    pub(crate) surface: &'a SkinSurface,
+    pub(crate) skin: &'a SkinPositions,
+    pub(crate) solid: &'a Solid,
+    pub(crate) placement: &'a Placement,
+    /// Features with a gap below this are found \[m\].
+    pub(crate) reach: f32,
+}
+
+/// A point of a tool that a triangle may lie under: an end of a rod, a corner of a hull.
+struct ToolPoint {
+    position: V3,
+    radius: f32,
+    /// The point may be this deep below the skin; deeper, it belongs to another side of it \[m\].
+    depth: f32,
+    number: usize,
+}
+
 /// Detection with its scratch.
 #[derive(Debug, Clone)]
 pub(crate) struct Detector {
@@ -78,52 +98,32 @@ impl Detector {
         vertices.map(|v| (v, self.distances[v]))
     }
 
-    /// All features of the skin with a gap below `reach`.
-    pub(crate) fn find(
-        &mut self,
-        surface: &SkinSurface,
-        skin: &SkinPositions,
-        solid: &Solid,
-        placement: &Placement,
-        reach: f32,
-    ) -> &[Candidate] {
+    /// All features of the skin within the search's reach.
+    pub(crate) fn find(&mut self, search: &Search<'_>) -> &[Candidate] {
         self.forget_vertices();
         self.candidates.clear();
         self.overflow = 0;
-        self.find_near_clusters(surface, skin, solid, placement, reach);
+        self.find_near_clusters(search);
         if !self.near_clusters.is_empty() {
-            self.measure_vertices(surface, skin, solid, placement);
-            self.vertices(surface, skin, solid, placement, reach);
-            if !matches!(solid, Solid::HalfSpace { .. }) {
-                self.edges(surface, skin, solid, placement, reach);
-                self.triangles(surface, skin, solid, placement, reach);
+            self.measure_vertices(search);
+            self.vertices(search);
+            if !matches!(search.solid, Solid::HalfSpace { .. }) {
+                self.edges(search);
+                self.triangles(search);
             }
         }
         &self.candidates
     }
 
-    /// Whether the body's box, grown by `reach`, meets any cluster.
-    pub(crate) fn is_near(
-        &mut self,
-        surface: &SkinSurface,
-        skin: &SkinPositions,
-        solid: &Solid,
-        placement: &Placement,
-        reach: f32,
-    ) -> bool {
+    /// Whether the body's box, grown by the reach, meets any cluster.
+    pub(crate) fn is_near(&mut self, search: &Search<'_>) -> bool {
         self.forget_vertices();
-        self.find_near_clusters(surface, skin, solid, placement, reach);
+        self.find_near_clusters(search);
         !self.near_clusters.is_empty()
     }
 
-    fn find_near_clusters(
-        &mut self,
-        surface: &SkinSurface,
-        skin: &SkinPositions,
-        solid: &Solid,
-        placement: &Placement,
-        reach: f32,
-    ) {
+    fn find_near_clusters(&mut self, search: &Search<'_>) {
+        let Search { surface, skin, solid, placement, reach } = *search;
         let [low, high] = solid.bounds(placement);
         let is_near = |bounds: &[[f32; 3]; 2], margin: f32| match solid {
             Solid::HalfSpace { normal } => {
@@ -141,7 +141,8 @@ impl Detector {
         }
     }
 
-    fn measure_vertices(&mut self, surface: &SkinSurface, skin: &SkinPositions, solid: &Solid, placement: &Placement) {
+    fn measure_vertices(&mut self, search: &Search<'_>) {
+        let Search { surface, skin, solid, placement, .. } = *search;
         for &cluster in &self.near_clusters {
             let first = cluster as usize * CLUSTER_SIZE;
             let last = (first + CLUSTER_SIZE).min(surface.rest.len());
@@ -184,14 +185,8 @@ impl Detector {
         }
     }
 
-    fn vertices(
-        &mut self,
-        surface: &SkinSurface,
-        skin: &SkinPositions,
-        solid: &Solid,
-        placement: &Placement,
-        reach: f32,
-    ) {
+    fn vertices(&mut self, search: &Search<'_>) {
+        let Search { surface, skin, solid, placement, reach } = *search;
         for index in 0..self.near_clusters.len() {
             let first = self.near_clusters[index] as usize * CLUSTER_SIZE;
             let last = (first + CLUSTER_SIZE).min(surface.rest.len());
@@ -212,7 +207,8 @@ impl Detector {
         }
     }
 
-    fn edges(&mut self, surface: &SkinSurface, skin: &SkinPositions, solid: &Solid, placement: &Placement, reach: f32) {
+    fn edges(&mut self, search: &Search<'_>) {
+        let Search { surface, skin, solid, placement, reach } = *search;
         for index in 0..self.near_clusters.len() {
             for &e in surface.edges_of_cluster(self.near_clusters[index] as usize) {
                 let [v0, v1] = surface.edges[e as usize].map(|v| v as usize);
@@ -241,14 +237,8 @@ impl Detector {
         }
     }
 
-    fn triangles(
-        &mut self,
-        surface: &SkinSurface,
-        skin: &SkinPositions,
-        solid: &Solid,
-        placement: &Placement,
-        reach: f32,
-    ) {
+    fn triangles(&mut self, search: &Search<'_>) {
+        let Search { surface, skin, solid, placement, reach } = *search;
         for index in 0..self.near_clusters.len() {
             let cluster = self.near_clusters[index] as usize;
             let margin = reach + STRETCH * surface.longest_edge(cluster);
@@ -264,7 +254,8 @@ impl Detector {
                         let ends = [placement.to_world(*a), placement.to_world(*b)];
                         let n_ends = if a == b { 1 } else { 2 };
                         for (k, end) in ends.iter().take(n_ends).enumerate() {
-                            self.under_tool_point(t, vertices, &corners, end, *radius, *radius, reach, k);
+                            let point = ToolPoint { position: *end, radius: *radius, depth: *radius, number: k };
+                            self.under_tool_point(search, t, &corners, &point);
                         }
                     }
                     Solid::Polytopes(parts) => {
@@ -275,16 +266,9 @@ impl Detector {
                                 let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
                                 let depth = (center - point).dot(&normal) / normal.norm();
                                 if depth > 0.0 {
-                                    self.under_tool_point(
-                                        t,
-                                        vertices,
-                                        &corners,
-                                        &point,
-                                        0.0,
-                                        depth,
-                                        reach,
-                                        (k << 12) + corner,
-                                    );
+                                    let number = (k << 12) + corner;
+                                    let point = ToolPoint { position: point, radius: 0.0, depth, number };
+                                    self.under_tool_point(search, t, &corners, &point);
                                 }
                             }
                         }
@@ -295,26 +279,16 @@ impl Detector {
         }
     }
 
-    /// The point of a triangle under a tool point of the given radius, if it is in its interior and no deeper than `depth`.
-    #[expect(clippy::too_many_arguments, reason = "the inner test of two loops; a struct would only rename them")]
-    fn under_tool_point(
-        &mut self,
-        triangle: u32,
-        vertices: [u32; 3],
-        corners: &[V3; 3],
-        tool_point: &V3,
-        radius: f32,
-        depth: f32,
-        reach: f32,
-        which: usize,
-    ) {
+    /// The point of a triangle under a tool point, if it lies inside the triangle and not too deep.
+    fn under_tool_point(&mut self, search: &Search<'_>, triangle: u32, corners: &[V3; 3], tool: &ToolPoint) {
+        let (reach, radius) = (search.reach, tool.radius);
         let [a, b, c] = corners;
         let normal = (b - a).cross(&(c - a));
         let area_squared = normal.norm_squared();
-        let height = (tool_point - a).dot(&normal);
+        let height = (tool.position - a).dot(&normal);
         let inverse = 1.0 / area_squared.max(1e-30);
-        let w1 = (tool_point - a).cross(&(c - a)).dot(&normal) * inverse;
-        let w2 = (b - a).cross(&(tool_point - a)).dot(&normal) * inverse;
+        let w1 = (tool.position - a).cross(&(c - a)).dot(&normal) * inverse;
+        let w2 = (b - a).cross(&(tool.position - a)).dot(&normal) * inverse;
         let weights = [1.0 - w1 - w2, w1, w2];
         // A sharp corner right above an edge is not seen by the edge, whose nearest face may be a side of the tool.
         let interior = if radius > 0.0 { INTERIOR } else { 0.0 };
@@ -323,9 +297,10 @@ impl Detector {
         }
         let distance = height * inverse.sqrt();
         let gap = distance - radius;
-        if gap < reach && distance > -depth {
+        if gap < reach && distance > -tool.depth {
             let point = a * weights[0] + b * weights[1] + c * weights[2];
-            let feature = feature(2, triangle as usize, which);
+            let feature = feature(2, triangle as usize, tool.number);
+            let vertices = search.surface.triangles[triangle as usize];
             self.push(Candidate { feature, vertices, weights, point, normal: -normal * inverse.sqrt(), gap });
         }
     }

@@ -3,7 +3,7 @@
 //! For a tool with an axis: where the axis meets the deformed skin, pulled back. For a ball, or where the axis misses:
 //! the centroid of smooth contact weights, 1 at gap <= 0 and falling to 0 at 1 mm. Never a vertex: it jitters.
 
-use super::{Detector, Placement, SkinSurface, Solid, V3};
+use super::{Detector, Search, SkinSurface, Solid, V3};
 use crate::embedding::SkinPositions;
 
 /// Gap at which a vertex no longer counts as touching \[m\].
@@ -17,25 +17,14 @@ pub(crate) struct ContactPoint {
 }
 
 /// `None` if nothing is near. `detector` holds what it found for this body.
-pub(crate) fn contact_point(
-    surface: &SkinSurface,
-    skin: &SkinPositions,
-    detector: &Detector,
-    solid: &Solid,
-    placement: &Placement,
-) -> Option<ContactPoint> {
-    let on_axis = if solid.has_axis() { on_axis(surface, skin, detector, solid, placement) } else { None };
-    on_axis.or_else(|| smooth_centroid(surface, skin, detector))
+pub(crate) fn contact_point(search: &Search<'_>, detector: &Detector) -> Option<ContactPoint> {
+    let on_axis = if search.solid.has_axis() { on_axis(search, detector) } else { None };
+    on_axis.or_else(|| smooth_centroid(search.surface, search.skin, detector))
 }
 
 /// The intersection of the axis with the near triangles that lies closest to the tip.
-fn on_axis(
-    surface: &SkinSurface,
-    skin: &SkinPositions,
-    detector: &Detector,
-    solid: &Solid,
-    placement: &Placement,
-) -> Option<ContactPoint> {
+fn on_axis(search: &Search<'_>, detector: &Detector) -> Option<ContactPoint> {
+    let Search { surface, skin, solid, placement, .. } = *search;
     let direction = -(placement.rotation * V3::z());
     let tip = tip_distance(solid);
     let mut best: Option<(f32, ContactPoint)> = None;
