@@ -20,7 +20,7 @@ use crate::workspace::Workspace;
 
 /// Passes in which rows may switch either way.
 const FREE_PASSES: u32 = 4;
-/// Passes in all; the later ones only switch rows off.
+/// Passes in all; the later ones only switch rows off and lower their friction.
 const MAX_PASSES: u32 = 12;
 /// A solve may leave this share of the contact impulse as residual.
 const IMPULSE_TOLERANCE: f32 = 1e-4;
