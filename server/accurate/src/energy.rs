@@ -1,0 +1,44 @@
+//! What can be minimised.
+
+use nalgebra::Vector3;
+use plica_geometry::NodeIdx;
+
+use crate::hessian::Hessian;
+
+/// Which second derivatives an energy hands out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Projection {
+    /// The second derivatives as they are.
+    Exact,
+    /// Replaced, stencil by stencil, by a positive semi-definite matrix nearby \[SGK19\].
+    PositiveSemidefinite,
+}
+
+/// A potential energy of nodal positions, `x: [n_nodes]` \[m\]; value in \[J\], gradient in \[N\], Hessian in \[N/m\].
+///
+/// The gradient is the derivative of the value and the Hessian that of the gradient; a shared harness checks both by finite
+/// differences. Loads that have no potential say so by [`Energy::has_potential`].
+pub trait Energy {
+    /// Calls `visit` with the nodes of every stencil: those whose second derivatives may couple, whatever `x` is.
+    fn visit_stencils(&self, visit: &mut dyn FnMut(&[NodeIdx]));
+
+    /// The energy \[J\]; infinite where `x` is not admissible (an inverted element of a material that forbids it).
+    fn value(&self, x: &[Vector3<f64>]) -> f64;
+
+    /// Adds the derivative of the value \[N\], `[n_nodes]`.
+    fn add_gradient(&self, x: &[Vector3<f64>], gradient: &mut [Vector3<f64>]);
+
+    /// Adds the second derivatives \[N/m\].
+    fn add_hessian(&self, x: &[Vector3<f64>], projection: Projection, hessian: &mut Hessian);
+
+    /// Whether the gradient is the derivative of the value. Without one the value is 0, the Hessian is the symmetric part
+    /// of the gradient's derivative, and the solver judges steps by the residual.
+    fn has_potential(&self) -> bool {
+        true
+    }
+
+    /// Smallest `det F` over the integration points, for energies that have any.
+    fn smallest_jacobian(&self, _x: &[Vector3<f64>]) -> Option<f64> {
+        None
+    }
+}

@@ -1,0 +1,380 @@
+//! Newton's method with a line search on a sum of energies.
+
+use std::ops::ControlFlow;
+
+use nalgebra::Vector3;
+
+use crate::constraints::Constraints;
+use crate::energy::{Energy, Projection};
+use crate::factor::{Factor, FactorError};
+use crate::hessian::Hessian;
+
+/// Share of the decrease that the slope promises which a step must reach \[NW06, eq. 3.6a\].
+const SUFFICIENT_DECREASE: f64 = 1e-4;
+/// Share of the slope that may be left after a step that is judged by its slope \[HZ05, eq. 23\].
+const SLOPE_LEFT: f64 = 0.9;
+/// Share of the energy below which its differences are rounding.
+const ROUNDING: f64 = 1e-13;
+/// First shift of a matrix that stays indefinite, as a share of its mean diagonal; every further one is ten times larger.
+const FIRST_SHIFT: f64 = 1e-6;
+const MAX_SHIFTS: u32 = 10;
+const MAX_HALVINGS: u32 = 30;
+
+/// When to stop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Params {
+    /// Largest force left at a free coordinate, as a share of the largest nodal force of any single energy.
+    pub tolerance: f64,
+    /// Newton steps after which the solve gives up.
+    pub max_iterations: u32,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self { tolerance: 1e-9, max_iterations: 100 }
+    }
+}
+
+/// How a solve went.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Info {
+    /// Residual before every Newton step and at the end, as a share of the largest nodal force.
+    pub residuals: Vec<f64>,
+    /// Newton steps.
+    pub iterations: u32,
+    /// Steps whose matrix was not positive definite, so that the projected one was used.
+    pub indefinite_steps: u32,
+    /// Halvings of steps by the line search.
+    pub halvings: u32,
+    /// Smallest `det F` of the result, where an energy has one.
+    pub smallest_jacobian: Option<f64>,
+}
+
+/// What the callback is told before every Newton step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// Newton steps taken.
+    pub iteration: u32,
+    /// Residual as a share of the largest nodal force.
+    pub residual: f64,
+}
+
+/// Why a solve has no result. `x` is left where the solve gave up.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// Too many steps.
+    #[error(
+        "residual {residual:.1e} of the largest force after {iterations} Newton steps, {tolerance:.1e} was asked for"
+    )]
+    NotConverged {
+        /// Newton steps taken.
+        iterations: u32,
+        /// Residual left.
+        residual: f64,
+        /// Residual asked for.
+        tolerance: f64,
+    },
+    /// No step along the Newton direction helps.
+    #[error("no step helps at residual {residual:.1e} of the largest force, after {iterations} Newton steps")]
+    LineSearch {
+        /// Newton steps taken.
+        iterations: u32,
+        /// Residual left.
+        residual: f64,
+    },
+    /// The matrix cannot be made positive definite by any reasonable shift.
+    #[error("the stiffness matrix is singular after {iterations} Newton steps: is the body held well enough?")]
+    Singular {
+        /// Newton steps taken.
+        iterations: u32,
+    },
+    /// The starting point is not admissible, or holds a number that is not finite.
+    #[error("the energy is not finite after {iterations} Newton steps: inverted elements, or a load beyond reason")]
+    NotFinite {
+        /// Newton steps taken.
+        iterations: u32,
+    },
+    /// The callback asked to stop.
+    #[error("cancelled after {iterations} Newton steps")]
+    Cancelled {
+        /// Newton steps taken.
+        iterations: u32,
+    },
+    /// No memory.
+    #[error(transparent)]
+    Factor(#[from] FactorError),
+}
+
+/// Minimises sums of energies that share one sparsity and one set of given coordinates.
+pub struct Solver {
+    hessian: Hessian,
+    factor: Factor,
+    gradient: Vec<Vector3<f64>>,
+    single: Vec<Vector3<f64>>,
+    right_hand_side: Vec<Vector3<f64>>,
+    direction: Vec<Vector3<f64>>,
+    motion: Vec<Vector3<f64>>,
+    trial: Vec<Vector3<f64>>,
+}
+
+/// Residual and what it is measured against.
+#[derive(Debug, Clone, Copy)]
+struct Residual {
+    /// Largest force at a free coordinate over the largest nodal force of a single energy.
+    relative: f64,
+    /// Norm of the force at free coordinates \[N\].
+    norm: f64,
+}
+
+impl Solver {
+    /// Analyses the sparsity of `energies` with the coordinates that `constraints` gives. Later calls of
+    /// [`Solver::minimise`] may use other energies on the same stencils and other targets of the same coordinates.
+    ///
+    /// # Errors
+    /// [`FactorError`]: no memory.
+    pub fn new(constraints: &Constraints, energies: &[&dyn Energy]) -> Result<Self, FactorError> {
+        let hessian = Hessian::new(constraints, energies);
+        let factor = Factor::new(&hessian)?;
+        let zeros = || vec![Vector3::zeros(); constraints.n_nodes()];
+        Ok(Self {
+            hessian,
+            factor,
+            gradient: zeros(),
+            single: zeros(),
+            right_hand_side: zeros(),
+            direction: zeros(),
+            motion: zeros(),
+            trial: zeros(),
+        })
+    }
+
+    /// Free unknowns, and values of the Cholesky factor: what a solve costs.
+    pub fn size(&self) -> (usize, usize) {
+        (self.hessian.n_unknowns(), self.factor.n_values())
+    }
+
+    /// Moves `x: [n_nodes]` \[m\] to a minimum of the sum of `energies` where `constraints` hold.
+    ///
+    /// Given coordinates travel to their targets with the first steps, the free ones following linearly. The exact Hessian
+    /// is used where it is positive definite, else a projected one \[SGK19\]. `observer` is called before every step and may
+    /// cancel.
+    ///
+    /// # Errors
+    /// See [`SolveError`].
+    ///
+    /// # Panics
+    /// If the lengths of `x` and `constraints` are not those of the analysis.
+    pub fn minimise(
+        &mut self,
+        energies: &[&dyn Energy],
+        constraints: &Constraints,
+        params: &Params,
+        x: &mut [Vector3<f64>],
+        observer: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<Info, SolveError> {
+        assert_eq!((x.len(), constraints.n_nodes()), (self.gradient.len(), self.gradient.len()), "nodes");
+        let mut info = Info::default();
+        loop {
+            let iterations = info.iterations;
+            let moves = self.find_motion(constraints, x);
+            let residual = self.find_residual(energies, constraints, x);
+            info.residuals.push(residual.relative);
+            if !residual.relative.is_finite() {
+                return Err(SolveError::NotFinite { iterations });
+            }
+            if observer(Progress { iteration: iterations, residual: residual.relative }).is_break() {
+                return Err(SolveError::Cancelled { iterations });
+            }
+            if !moves && residual.relative <= params.tolerance {
+                break;
+            }
+            if iterations == params.max_iterations {
+                let (residual, tolerance) = (residual.relative, params.tolerance);
+                return Err(SolveError::NotConverged { iterations, residual, tolerance });
+            }
+            self.find_direction(energies, constraints, moves, x, &mut info)?;
+            let went = if moves {
+                self.follow_given(energies, x, &mut info)
+            } else {
+                self.search_line(energies, constraints, residual, x, &mut info)
+            };
+            if !went {
+                return Err(SolveError::LineSearch { iterations, residual: residual.relative });
+            }
+            info.iterations += 1;
+        }
+        info.smallest_jacobian = smallest_jacobian(energies, x);
+        Ok(info)
+    }
+
+    /// What given coordinates still have to move; whether any has.
+    fn find_motion(&mut self, constraints: &Constraints, x: &[Vector3<f64>]) -> bool {
+        let mut moves = false;
+        for (node, motion) in self.motion.iter_mut().enumerate() {
+            *motion = constraints.remaining(node, &x[node]);
+            moves |= *motion != Vector3::zeros();
+        }
+        moves
+    }
+
+    fn find_residual(&mut self, energies: &[&dyn Energy], constraints: &Constraints, x: &[Vector3<f64>]) -> Residual {
+        let mut largest_force = 0.0_f64;
+        self.gradient.fill(Vector3::zeros());
+        for energy in energies {
+            self.single.fill(Vector3::zeros());
+            energy.add_gradient(x, &mut self.single);
+            for (sum, force) in self.gradient.iter_mut().zip(&self.single) {
+                *sum += force;
+                largest_force = largest_force.max(force.norm());
+            }
+        }
+        clear_given(&mut self.gradient, constraints);
+        let largest = self.gradient.iter().map(Vector3::norm).fold(0.0, nan_max);
+        let norm = self.gradient.iter().map(Vector3::norm_squared).sum::<f64>().sqrt();
+        Residual { relative: if largest == 0.0 { 0.0 } else { largest / largest_force }, norm }
+    }
+
+    /// `direction = -H^-1 (gradient + H_free,given motion)`.
+    fn find_direction(
+        &mut self,
+        energies: &[&dyn Energy],
+        constraints: &Constraints,
+        moves: bool,
+        x: &[Vector3<f64>],
+        info: &mut Info,
+    ) -> Result<(), SolveError> {
+        if !self.factorise(energies, Projection::Exact, moves, x) {
+            info.indefinite_steps += 1;
+            if !self.factorise(energies, Projection::PositiveSemidefinite, moves, x) && !self.factorise_shifted() {
+                return Err(SolveError::Singular { iterations: info.iterations });
+            }
+        }
+        for ((b, g), lift) in self.right_hand_side.iter_mut().zip(&self.gradient).zip(self.hessian.lift()) {
+            *b = lift - g;
+        }
+        clear_given(&mut self.right_hand_side, constraints);
+        self.factor.solve(&self.hessian, &self.right_hand_side, &mut self.direction);
+        for (direction, motion) in self.direction.iter_mut().zip(&self.motion) {
+            *direction += motion;
+        }
+        Ok(())
+    }
+
+    fn factorise(&mut self, energies: &[&dyn Energy], projection: Projection, moves: bool, x: &[Vector3<f64>]) -> bool {
+        self.hessian.clear(moves.then_some(&self.motion));
+        for energy in energies {
+            energy.add_hessian(x, projection, &mut self.hessian);
+        }
+        let scale = self.hessian.mean_diagonal();
+        self.hessian.finish(scale);
+        self.factor.factorise(&self.hessian).is_ok()
+    }
+
+    fn factorise_shifted(&mut self) -> bool {
+        let mut shift = FIRST_SHIFT * self.hessian.mean_diagonal();
+        for _ in 0..MAX_SHIFTS {
+            self.hessian.add_diagonal(shift);
+            if self.factor.factorise(&self.hessian).is_ok() {
+                return true;
+            }
+            shift *= 10.0;
+        }
+        false
+    }
+
+    /// Takes the longest step that keeps the energy finite and turns no element over.
+    fn follow_given(&mut self, energies: &[&dyn Energy], x: &mut [Vector3<f64>], info: &mut Info) -> bool {
+        let mut length = 1.0;
+        for _ in 0..=MAX_HALVINGS {
+            self.try_step(x, length);
+            let is_upright = smallest_jacobian(energies, &self.trial).is_none_or(|j| j > 0.0);
+            if is_upright && value(energies, &self.trial).is_finite() {
+                x.copy_from_slice(&self.trial);
+                return true;
+            }
+            info.halvings += 1;
+            length *= 0.5;
+        }
+        false
+    }
+
+    /// Backtracks until the energy has fallen enough or, where its differences are rounding, the slope has.
+    fn search_line(
+        &mut self,
+        energies: &[&dyn Energy],
+        constraints: &Constraints,
+        residual: Residual,
+        x: &mut [Vector3<f64>],
+        info: &mut Info,
+    ) -> bool {
+        let has_potential = energies.iter().all(|e| e.has_potential());
+        let energy = value(energies, x);
+        let slope: f64 = self.gradient.iter().zip(&self.direction).map(|(g, p)| g.dot(p)).sum();
+        let mut length = 1.0;
+        for _ in 0..=MAX_HALVINGS {
+            self.try_step(x, length);
+            let trial = value(energies, &self.trial);
+            let accepted = if !trial.is_finite() {
+                false
+            } else if has_potential && trial <= energy + SUFFICIENT_DECREASE * length * slope {
+                true
+            } else if has_potential && trial > energy + ROUNDING * (energy.abs() + slope.abs()) {
+                false
+            } else {
+                self.is_better_by_slope(energies, constraints, has_potential, slope, residual)
+            };
+            if accepted {
+                x.copy_from_slice(&self.trial);
+                return true;
+            }
+            info.halvings += 1;
+            length *= 0.5;
+        }
+        false
+    }
+
+    /// Judges `trial` by its forces. Overwrites the gradient only of a step that is not taken again.
+    fn is_better_by_slope(
+        &mut self,
+        energies: &[&dyn Energy],
+        constraints: &Constraints,
+        has_potential: bool,
+        slope: f64,
+        residual: Residual,
+    ) -> bool {
+        let gradient = self.gradient.clone();
+        let trial = std::mem::take(&mut self.trial);
+        let found = self.find_residual(energies, constraints, &trial);
+        let left: f64 = self.gradient.iter().zip(&self.direction).map(|(g, p)| g.dot(p)).sum();
+        self.trial = trial;
+        self.gradient = gradient;
+        if has_potential { left.abs() <= SLOPE_LEFT * slope.abs() } else { found.norm < residual.norm }
+    }
+
+    fn try_step(&mut self, x: &[Vector3<f64>], length: f64) {
+        for ((trial, x), p) in self.trial.iter_mut().zip(x).zip(&self.direction) {
+            *trial = x + p * length;
+        }
+    }
+}
+
+fn value(energies: &[&dyn Energy], x: &[Vector3<f64>]) -> f64 {
+    energies.iter().map(|e| e.value(x)).sum()
+}
+
+fn smallest_jacobian(energies: &[&dyn Energy], x: &[Vector3<f64>]) -> Option<f64> {
+    energies.iter().filter_map(|e| e.smallest_jacobian(x)).reduce(f64::min)
+}
+
+fn clear_given(vectors: &mut [Vector3<f64>], constraints: &Constraints) {
+    for (node, v) in vectors.iter_mut().enumerate() {
+        for (k, _) in constraints.is_given(node).iter().enumerate().filter(|(_, given)| **given) {
+            v[k] = 0.0;
+        }
+    }
+}
+
+/// Unlike `f64::max`, keeps NaN.
+fn nan_max(a: f64, b: f64) -> f64 {
+    if b.is_nan() || a.is_nan() { f64::NAN } else { a.max(b) }
+}
