@@ -18,6 +18,8 @@ pub struct State {
     pub(crate) u: Vec<Node>,
     /// Nodal velocities \[m/s\].
     pub(crate) v: Vec<Node>,
+    /// Constant forces on free nodes, in internal order \[N\]; empty where nothing but tools, gravity and supports acts.
+    pub(crate) external_forces: Vec<Node>,
     /// Rotation of each element, by batch.
     pub(crate) quaternions: Vec<Quaternions>,
     pub(crate) skin: SkinPositions,
@@ -47,6 +49,7 @@ impl State {
             tick: 0,
             u: vec![[0.0; 4]; model.n_nodes()],
             v: vec![[0.0; 4]; model.n_nodes()],
+            external_forces: Vec::new(),
             quaternions: vec![IDENTITY; model.elements.n_batches()],
             skin: SkinPositions::at_rest(&model.embedding),
             contacts: Vec::with_capacity(n_contacts),
@@ -63,10 +66,11 @@ impl State {
         }
     }
 
-    /// Becomes a copy of a state of the same model, without allocating.
+    /// Becomes a copy of a state of the same model, without allocating (but for the first state with external forces).
     pub fn copy_from(&mut self, other: &Self) {
         self.u.copy_from_slice(&other.u);
         self.v.copy_from_slice(&other.v);
+        self.external_forces.clone_from(&other.external_forces);
         self.quaternions.copy_from_slice(&other.quaternions);
         self.skin.copy_from(&other.skin);
         self.contacts.clear();
@@ -139,6 +143,20 @@ impl State {
         model.embedding.apply(&self.u, &mut self.skin);
     }
 
+    /// Sets constant forces that act in every tick from now on, in the order of the mesh's nodes, `[n_nodes]` \[N\]; an empty
+    /// slice takes them away. Fixed nodes bear theirs. For training: the suction that lifts the skin, which contact cannot.
+    ///
+    /// # Panics
+    /// If there are neither none nor `n_nodes` forces.
+    pub fn set_external_forces(&mut self, model: &Model, forces: &[Vector3<f64>]) {
+        assert!(forces.is_empty() || forces.len() == model.n_nodes(), "{} forces", forces.len());
+        let of_node = |&node: &u32| forces[node as usize].cast::<f32>();
+        let free = &model.order.mesh_of_internal[..if forces.is_empty() { 0 } else { model.n_free }];
+        self.external_forces.clear();
+        self.external_forces.extend(free.iter().map(of_node).map(|f| [f.x, f.y, f.z, 0.0]));
+        (self.sleeping, self.quiet_s) = (false, 0.0);
+    }
+
     /// Speed of the fastest node \[m/s\].
     pub(crate) fn max_speed(&self) -> f32 {
         let squared = |n: &Node| n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
@@ -182,6 +200,7 @@ impl Clone for State {
             tick: self.tick,
             u: self.u.clone(),
             v: self.v.clone(),
+            external_forces: self.external_forces.clone(),
             quaternions: self.quaternions.clone(),
             skin: self.skin.clone(),
             contacts,

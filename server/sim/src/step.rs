@@ -84,7 +84,7 @@ fn rotate_elements(model: &Model, state: &mut State, workspace: &mut Workspace) 
     }
 }
 
-/// `r = h f(x + h v) + h M (g - alpha v)`
+/// `r = h f(x + h v) + h M (g - alpha v) + h f_external`
 fn load_residual(model: &Model, state: &State, workspace: &mut Workspace) {
     let (h, d) = (model.dt, &model.description);
     let gravity: V3 = d.gravity_m_per_s2.cast();
@@ -95,6 +95,11 @@ fn load_residual(model: &Model, state: &State, workspace: &mut Workspace) {
     for ((r, v), m) in workspace.residual.iter_mut().zip(&state.v).zip(&model.node_mass) {
         for k in 0..3 {
             r[k] += h * m * (gravity[k] - alpha * v[k]);
+        }
+    }
+    for (r, force) in workspace.residual.iter_mut().zip(&state.external_forces) {
+        for k in 0..3 {
+            r[k] += h * force[k];
         }
     }
 }
