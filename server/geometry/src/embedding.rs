@@ -5,7 +5,7 @@ use nalgebra::{Matrix4, Point3, Vector3, Vector4};
 use crate::hex_mesh::HexMesh;
 use crate::index::{NodeIdx, VertexIdx};
 use crate::isoparametric::shape_functions;
-use crate::locate::{Location, locate};
+use crate::locate::{Location, Locator};
 use crate::neighbourhood::Neighbourhoods;
 
 /// Support of moving least squares that is used unless a scene says otherwise, in cells.
@@ -101,11 +101,12 @@ impl Embedding {
             EmbeddingKind::MovingLeastSquares { support_cells } => checked_support(support_cells)? * cell_m,
             EmbeddingKind::Trilinear => 0.0,
         };
+        let locator = Locator::new(mesh);
         let mut neighbourhoods = Neighbourhoods::new(mesh, radius_m);
         let mut embedding = Self::empty(mesh.n_nodes(), points.len());
         for (i, x) in points.iter().enumerate() {
             let point = VertexIdx::from_index(i);
-            let location = located(mesh, x, point, MAX_OUTSIDE_CELLS * cell_m)?;
+            let location = located(&locator, x, point, MAX_OUTSIDE_CELLS * cell_m)?;
             match kind {
                 EmbeddingKind::Trilinear => embedding.push(trilinear_row(mesh, &location)),
                 EmbeddingKind::MovingLeastSquares { .. } => {
@@ -199,12 +200,12 @@ fn checked_support(support_cells: f64) -> Result<f64, EmbeddingError> {
     valid.then_some(support_cells).ok_or(EmbeddingError::Support { support_cells })
 }
 
-fn located(mesh: &HexMesh, x: &Point3<f64>, point: VertexIdx, limit_m: f64) -> Result<Location, EmbeddingError> {
+fn located(locator: &Locator<'_>, x: &Point3<f64>, point: VertexIdx, limit_m: f64) -> Result<Location, EmbeddingError> {
     let position = x.coords.into();
     if x.iter().any(|c| !c.is_finite()) {
         return Err(EmbeddingError::NonFinite { point, position });
     }
-    locate(mesh, x, limit_m).ok_or(EmbeddingError::Outside { point, position, limit_m })
+    locator.locate(x, limit_m).ok_or(EmbeddingError::Outside { point, position, limit_m })
 }
 
 fn trilinear_row(mesh: &HexMesh, location: &Location) -> Vec<(NodeIdx, f64)> {

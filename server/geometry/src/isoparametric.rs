@@ -64,13 +64,21 @@ const EDGES: [[usize; 2]; 12] =
 /// element too, as far as the trilinear map can be inverted there.
 ///
 /// # Errors
-/// `None` when Newton's method does not reach `1e-13` of the longest edge in 50 steps, or meets a singular `J`:
-/// that happens only for points well outside a distorted element.
+/// `None` when Newton's method does not reach `1e-13` of the longest edge (or what rounding of the coordinates allows)
+/// in 50 steps, or meets a singular `J`: that happens only for points well outside a distorted element.
 pub fn inverse_map(corners: &[Point3<f64>; 8], x: &Point3<f64>) -> Option<[f64; 3]> {
+    inverse_map_from(corners, x, [0.0; 3])
+}
+
+/// [`inverse_map`] from a start other than the centre.
+///
+/// # Errors
+/// As [`inverse_map`].
+pub fn inverse_map_from(corners: &[Point3<f64>; 8], x: &Point3<f64>, start: [f64; 3]) -> Option<[f64; 3]> {
     const MAX_STEPS: usize = 50;
     const STEP_LIMIT: f64 = 2.0;
-    let tolerance = 1e-13 * longest_edge(corners);
-    let mut xi = Vector3::zeros();
+    let tolerance = (1e-13 * longest_edge(corners)).max(4.0 * f64::EPSILON * x.coords.amax());
+    let mut xi = Vector3::from(start);
     for _ in 0..MAX_STEPS {
         let residual = x - map(corners, xi.into());
         let step = jacobian(corners, xi.into()).try_inverse()? * residual;
@@ -84,4 +92,54 @@ pub fn inverse_map(corners: &[Point3<f64>; 8], x: &Point3<f64>) -> Option<[f64; 
         }
     }
     None
+}
+
+/// Reference coordinates in `[-1, 1]^3` of the element's point nearest to `x`: minimises `1/2 |X(xi) - x|^2` by
+/// projected Gauss-Newton steps `J_f^T J_f step = -J_f^T (X - x)`, `f` the coordinates that are free to move into the
+/// element, from `start`.
+pub fn closest_point(corners: &[Point3<f64>; 8], x: &Point3<f64>, start: [f64; 3]) -> [f64; 3] {
+    const MAX_STEPS: usize = 50;
+    const SMALL_STEP: f64 = 1e-12;
+    let mut xi = Vector3::from(start);
+    for _ in 0..MAX_STEPS {
+        let residual = map(corners, xi.into()) - x;
+        let step = projected_step(&jacobian(corners, xi.into()), &residual, &xi);
+        let next = shorter_until_better(corners, x, &xi, &step, residual.norm());
+        let moved = next.map_or(0.0, |next| (next - xi).amax());
+        xi = next.unwrap_or(xi);
+        if moved <= SMALL_STEP {
+            break;
+        }
+    }
+    xi.into()
+}
+
+/// The Gauss-Newton step over the coordinates that are not held at a face by the gradient `J^T r`.
+fn projected_step(jacobian: &Matrix3<f64>, residual: &Vector3<f64>, xi: &Vector3<f64>) -> Vector3<f64> {
+    let gradient = jacobian.transpose() * residual;
+    let mut normal = jacobian.transpose() * jacobian;
+    let mut right = -gradient;
+    for k in 0..3 {
+        let is_held = (xi[k] >= 1.0 && gradient[k] <= 0.0) || (xi[k] <= -1.0 && gradient[k] >= 0.0);
+        if is_held {
+            normal.row_mut(k).fill(0.0);
+            normal.column_mut(k).fill(0.0);
+            normal[(k, k)] = 1.0;
+            right[k] = 0.0;
+        }
+    }
+    normal.try_inverse().map_or_else(Vector3::zeros, |inverse| inverse * right)
+}
+
+/// The clamped end of the longest of `step`, `step / 2`, ... that comes nearer to `x` than `distance`.
+fn shorter_until_better(
+    corners: &[Point3<f64>; 8],
+    x: &Point3<f64>,
+    xi: &Vector3<f64>,
+    step: &Vector3<f64>,
+    distance: f64,
+) -> Option<Vector3<f64>> {
+    const MAX_HALVINGS: i32 = 12;
+    let ends = (0..=MAX_HALVINGS).map(|halvings| (xi + step * 0.5_f64.powi(halvings)).map(|c| c.clamp(-1.0, 1.0)));
+    ends.into_iter().find(|end| (map(corners, (*end).into()) - x).norm() < distance)
 }

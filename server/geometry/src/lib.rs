@@ -3,6 +3,7 @@
 //!
 //! Everything is `f64` in SI units (metres), right-handed, z up. This crate knows no physics, no bus and no clock.
 
+mod box_tree;
 mod clusters;
 mod embedding;
 pub mod export;
@@ -18,5 +19,5 @@ pub use clusters::CLUSTER_SIZE;
 pub use embedding::{DEFAULT_SUPPORT_CELLS, Embedding, EmbeddingError, EmbeddingKind, MAX_OUTSIDE_CELLS};
 pub use hex_mesh::{HEX_FACES, HexMesh, MeshError};
 pub use index::{HexIdx, NodeIdx, TriangleIdx, VertexIdx};
-pub use locate::{Location, locate};
+pub use locate::{Location, Locator, locate};
 pub use skin::{Skin, SkinError};

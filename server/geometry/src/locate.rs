@@ -2,12 +2,19 @@
 
 use nalgebra::Point3;
 
+use crate::box_tree::{Aabb, BoxTree};
 use crate::hex_mesh::HexMesh;
 use crate::index::HexIdx;
-use crate::isoparametric::{inverse_map, map};
+use crate::isoparametric::{closest_point, inverse_map, inverse_map_from, map};
 
 /// Reference coordinates may exceed 1 by this much before a point counts as outside.
 const INSIDE_TOLERANCE: f64 = 1e-9;
+/// Share of a hexahedron's box by which a point that counts as inside may lie outside the box.
+const BOX_TOLERANCE: f64 = 10.0 * INSIDE_TOLERANCE;
+/// Distances that agree to this share are compared, not trusted: rounding may turn them round.
+const ROUNDING: f64 = 1e-9;
+/// Reference coordinates beyond this belong to another branch of the inverse map more often than not.
+const FAR_OUTSIDE: f64 = 3.0;
 
 /// Where a point lies in a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,42 +23,77 @@ pub struct Location {
     pub hex: HexIdx,
     /// Reference coordinates in it; beyond `[-1, 1]` for a point outside the mesh.
     pub xi: [f64; 3],
-    /// Distance to the hexahedron \[m\], 0 inside. Outside: to the image of the clamped reference coordinates.
+    /// Distance to the hexahedron \[m\], 0 inside.
     pub distance_m: f64,
 }
 
-/// The hexahedron that contains `x` (the one of least index when several do), otherwise the nearest one whose
-/// bounding box is within `max_distance_m` of `x`; `None` if there is none.
+/// The hexahedron that contains `x` (the one of least index when several do), otherwise the nearest one within
+/// `max_distance_m` of `x` (ties: least index); `None` if there is none.
+///
+/// This asks every hexahedron: for more than a few points take a [`Locator`], which gives the same answers.
 pub fn locate(mesh: &HexMesh, x: &Point3<f64>, max_distance_m: f64) -> Option<Location> {
-    let mut nearest: Option<Location> = None;
-    for hex in mesh.hex_indices() {
-        let corners = mesh.corner_positions(hex);
-        let reach = nearest.map_or(max_distance_m, |found| found.distance_m);
-        if distance_to_box(&corners, x) > reach {
-            continue;
-        }
-        if let Some(found) = locate_in(&corners, hex, x) {
-            if found.distance_m == 0.0 {
-                return Some(found);
-            }
-            if nearest.is_none_or(|best| found.distance_m < best.distance_m) {
-                nearest = Some(found);
-            }
-        }
+    let boxes: Vec<_> = mesh.hex_indices().map(|hex| (hex, Aabb::around(&mesh.corner_positions(hex)))).collect();
+    let touched = boxes.iter().filter(|(_, bounds)| bounds.distance(x) <= BOX_TOLERANCE * bounds.diagonal());
+    containing(mesh, x, touched.map(|&(hex, _)| hex)).or_else(|| {
+        let near = boxes.iter().map(|(hex, bounds)| (*hex, bounds.distance(x)));
+        nearest(mesh, x, max_distance_m, near.filter(|&(_, distance)| distance <= max_distance_m).collect())
+    })
+}
+
+/// Finds hexahedra of one mesh for many points.
+#[derive(Clone, Debug)]
+pub struct Locator<'a> {
+    mesh: &'a HexMesh,
+    tree: BoxTree,
+    /// How far outside its box a hexahedron may hold a point \[m\].
+    slack_m: f64,
+}
+
+impl<'a> Locator<'a> {
+    /// Sorts the hexahedra of `mesh` into a tree of boxes.
+    pub fn new(mesh: &'a HexMesh) -> Self {
+        let boxes: Vec<_> = mesh.hex_indices().map(|hex| Aabb::around(&mesh.corner_positions(hex))).collect();
+        let slack_m = BOX_TOLERANCE * boxes.iter().map(Aabb::diagonal).fold(0.0, f64::max);
+        Self { mesh, tree: BoxTree::new(boxes), slack_m }
     }
-    nearest.filter(|found| found.distance_m <= max_distance_m)
+
+    /// The same as [`locate`].
+    pub fn locate(&self, x: &Point3<f64>, max_distance_m: f64) -> Option<Location> {
+        let near = |distance_m| self.tree.within(x, distance_m).into_iter().map(|(i, d)| (HexIdx::from_index(i), d));
+        containing(self.mesh, x, near(self.slack_m).map(|(hex, _)| hex))
+            .or_else(|| nearest(self.mesh, x, max_distance_m, near(max_distance_m).collect()))
+    }
 }
 
-fn locate_in(corners: &[Point3<f64>; 8], hex: HexIdx, x: &Point3<f64>) -> Option<Location> {
-    let xi = inverse_map(corners, x)?;
-    let inside = xi.iter().all(|c| c.abs() <= 1.0 + INSIDE_TOLERANCE);
-    let distance_m = if inside { 0.0 } else { (map(corners, xi.map(|c| c.clamp(-1.0, 1.0))) - x).norm() };
-    Some(Location { hex, xi, distance_m })
+/// The first of `hexes` that contains `x`.
+fn containing(mesh: &HexMesh, x: &Point3<f64>, mut hexes: impl Iterator<Item = HexIdx>) -> Option<Location> {
+    hexes.find_map(|hex| {
+        let xi = inverse_map(&mesh.corner_positions(hex), x)?;
+        let is_inside = xi.iter().all(|c| c.abs() <= 1.0 + INSIDE_TOLERANCE);
+        is_inside.then_some(Location { hex, xi, distance_m: 0.0 })
+    })
 }
 
-fn distance_to_box(corners: &[Point3<f64>; 8], x: &Point3<f64>) -> f64 {
-    let lower = corners.iter().fold(corners[0], |a, c| a.inf(c));
-    let upper = corners.iter().fold(corners[0], |a, c| a.sup(c));
-    let nearest = x.sup(&lower).inf(&upper);
-    (x - nearest).norm()
+/// The nearest of hexahedra that are given with the distance to their boxes.
+fn nearest(mesh: &HexMesh, x: &Point3<f64>, max_distance_m: f64, mut near: Vec<(HexIdx, f64)>) -> Option<Location> {
+    near.sort_unstable_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+    let mut best: Option<Location> = None;
+    for (hex, to_box) in near {
+        if best.is_some_and(|best| to_box > best.distance_m * (1.0 + ROUNDING)) {
+            break;
+        }
+        let is_nearer =
+            |found: &Location| best.is_none_or(|best| (found.distance_m, found.hex) < (best.distance_m, best.hex));
+        best = locate_outside(&mesh.corner_positions(hex), hex, x).filter(is_nearer).or(best);
+    }
+    best.filter(|found| found.distance_m <= max_distance_m)
+}
+
+/// A hexahedron for a point that it does not contain; `None` where its map cannot be continued to the point.
+fn locate_outside(corners: &[Point3<f64>; 8], hex: HexIdx, x: &Point3<f64>) -> Option<Location> {
+    let from_centre = inverse_map(corners, x).filter(|xi| xi.iter().all(|c| c.abs() <= FAR_OUTSIDE));
+    let start = from_centre.map_or([0.0; 3], |xi| xi.map(|c| c.clamp(-1.0, 1.0)));
+    let closest = closest_point(corners, x, start);
+    let xi = from_centre.or_else(|| inverse_map_from(corners, x, closest))?;
+    Some(Location { hex, xi, distance_m: (map(corners, closest) - x).norm() })
 }
