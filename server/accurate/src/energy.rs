@@ -41,4 +41,9 @@ pub trait Energy {
     fn smallest_jacobian(&self, _x: &[Vector3<f64>]) -> Option<f64> {
         None
     }
+
+    /// Whether no element that could is turned over. Given coordinates do not travel beyond that in one step.
+    fn is_upright(&self, x: &[Vector3<f64>]) -> bool {
+        self.smallest_jacobian(x).is_none_or(|j| j > 0.0)
+    }
 }

@@ -8,12 +8,23 @@
 //! cancel. The same input gives the same bits.
 
 mod constraints;
+pub mod contact;
 mod energy;
 mod factor;
 mod hessian;
+mod loads;
+mod material;
 mod newton;
+mod reaction;
+mod solid;
+mod tie;
 
 pub use constraints::Constraints;
 pub use energy::{Energy, Projection};
 pub use hessian::Hessian;
+pub use loads::{NodalForces, Pressure, Traction};
+pub use material::{Lame, Material, MaterialError, MaterialModel};
 pub use newton::{Info, Params, Progress, SolveError, Solver};
+pub use reaction::reactions;
+pub use solid::{GAUSS_POINTS, Solid, SolidError};
+pub use tie::{TIE_VERSION, Tie, TieOptions, TieTarget};

@@ -1,0 +1,98 @@
+//! Loads: forces that keep their direction, and pressure that follows the surface.
+
+mod pressure;
+mod quad;
+
+use nalgebra::Vector3;
+use plica_geometry::{HexMesh, NodeIdx};
+
+use crate::energy::{Energy, Projection};
+use crate::hessian::Hessian;
+pub use pressure::Pressure;
+use quad::{QUAD_GAUSS_POINTS, corners, normal};
+
+/// Dead forces at nodes: `W = -sum_n f_n . x_n`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NodalForces {
+    forces: Vec<(NodeIdx, Vector3<f64>)>,
+}
+
+impl NodalForces {
+    /// Forces \[N\] at nodes; those of a node named twice add up.
+    pub fn new(forces: Vec<(NodeIdx, Vector3<f64>)>) -> Self {
+        Self { forces }
+    }
+
+    /// Sum of all forces \[N\].
+    pub fn total(&self) -> Vector3<f64> {
+        self.forces.iter().map(|(_, f)| f).sum()
+    }
+
+    /// The forces \[N\], as given.
+    pub fn forces(&self) -> &[(NodeIdx, Vector3<f64>)] {
+        &self.forces
+    }
+}
+
+impl Energy for NodalForces {
+    fn visit_stencils(&self, _visit: &mut dyn FnMut(&[NodeIdx])) {}
+
+    fn value(&self, x: &[Vector3<f64>]) -> f64 {
+        -self.forces.iter().map(|(node, f)| f.dot(&x[node.index()])).sum::<f64>()
+    }
+
+    fn add_gradient(&self, _x: &[Vector3<f64>], gradient: &mut [Vector3<f64>]) {
+        self.forces.iter().for_each(|(node, f)| gradient[node.index()] -= f);
+    }
+
+    fn add_hessian(&self, _x: &[Vector3<f64>], _projection: Projection, _hessian: &mut Hessian) {}
+}
+
+/// A dead traction on faces: force per rest area, whatever becomes of the surface.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Traction {
+    nodal: NodalForces,
+}
+
+impl Traction {
+    /// `f_a = int N_a t dA` over the rest faces, by 2 x 2 Gauss points; `traction_pa` \[Pa\] is one vector for all `quads`
+    /// (outward, as [`HexMesh::boundary_quads`] has them).
+    ///
+    /// # Panics
+    /// If a quad names a node that the mesh does not have.
+    pub fn new(mesh: &HexMesh, quads: &[[NodeIdx; 4]], traction_pa: Vector3<f64>) -> Self {
+        let rest: Vec<_> = mesh.nodes().iter().map(|x| x.coords).collect();
+        let mut forces = Vec::with_capacity(4 * quads.len());
+        for quad in quads {
+            let corners = corners(&rest, quad);
+            for (a, &node) in quad.iter().enumerate() {
+                let area: f64 = QUAD_GAUSS_POINTS.iter().map(|q| q.shape[a] * normal(&corners, q).norm()).sum();
+                forces.push((node, traction_pa * area));
+            }
+        }
+        Self { nodal: NodalForces::new(forces) }
+    }
+
+    /// Sum of all forces \[N\].
+    pub fn total(&self) -> Vector3<f64> {
+        self.nodal.total()
+    }
+}
+
+impl Energy for Traction {
+    fn visit_stencils(&self, visit: &mut dyn FnMut(&[NodeIdx])) {
+        self.nodal.visit_stencils(visit);
+    }
+
+    fn value(&self, x: &[Vector3<f64>]) -> f64 {
+        self.nodal.value(x)
+    }
+
+    fn add_gradient(&self, x: &[Vector3<f64>], gradient: &mut [Vector3<f64>]) {
+        self.nodal.add_gradient(x, gradient);
+    }
+
+    fn add_hessian(&self, x: &[Vector3<f64>], projection: Projection, hessian: &mut Hessian) {
+        self.nodal.add_hessian(x, projection, hessian);
+    }
+}

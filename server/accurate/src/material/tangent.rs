@@ -1,0 +1,87 @@
+//! Second derivatives of the local part, with the curvature of `J` under a mean pressure.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::deformation::Deformation;
+use super::modes::NegativeModes;
+use super::{Law, MaterialModel};
+use crate::energy::Projection;
+
+/// `d^2 psi / dF^2 + p d^2 J / dF^2`, given by its action on rank-one variations `dF = v g^T`. With `C = cof F`:
+///
+/// `H = 2 psi_I 1 + 4 psi_II F (x) F + psi_JJ C (x) C + (psi_J + p) d^2 J`, `d^2 J [u a^T, v b^T] = u . (v x F (a x b))`.
+///
+/// Projected, `-eta Q (x) Q` is added for every eigenvalue `eta < 0` with its eigenmatrix `Q` \[SGK19\].
+pub(crate) struct Tangent {
+    f: Matrix3<f64>,
+    cofactor: Matrix3<f64>,
+    /// Factors of `1`, `F (x) F`, `C (x) C`, `d^2 J`.
+    identity: f64,
+    along_f: f64,
+    along_cofactor: f64,
+    curvature: f64,
+    /// Factor of the transposition `dF -> dF^T` (linear material).
+    transposition: f64,
+    negative: NegativeModes,
+}
+
+impl Tangent {
+    pub(crate) fn new(law: &Law, deformation: &Deformation, pressure: f64, projection: Projection) -> Self {
+        if law.model == MaterialModel::Linear {
+            return Self::linear(law.mu);
+        }
+        let slopes = law.slopes(deformation);
+        let mut tangent = Self {
+            f: deformation.f(),
+            cofactor: deformation.cofactor(),
+            identity: 2.0 * slopes.by_i,
+            along_f: 4.0 * slopes.by_ii,
+            along_cofactor: slopes.by_jj,
+            curvature: slopes.by_j + pressure,
+            transposition: 0.0,
+            negative: NegativeModes::default(),
+        };
+        if projection == Projection::PositiveSemidefinite {
+            let factors = [tangent.identity, tangent.along_f, tangent.along_cofactor, tangent.curvature];
+            tangent.negative = NegativeModes::new(&tangent.f, factors);
+        }
+        tangent
+    }
+
+    /// `2 mu sym`: positive semi-definite, and the trace is linear in `F`.
+    fn linear(mu: f64) -> Self {
+        Self {
+            f: Matrix3::identity(),
+            cofactor: Matrix3::identity(),
+            identity: mu,
+            along_f: 0.0,
+            along_cofactor: 0.0,
+            curvature: 0.0,
+            transposition: mu,
+            negative: NegativeModes::default(),
+        }
+    }
+
+    /// `B` with `u^T B v = H[u a^T, v b^T]`.
+    pub(crate) fn block(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> Matrix3<f64> {
+        let (f, c) = (&self.f, &self.cofactor);
+        let w = f * a.cross(b) * self.curvature;
+        // u . (v x w) = -u^T [w]_x v.
+        let bend = Matrix3::new(0.0, w.z, -w.y, -w.z, 0.0, w.x, w.y, -w.x, 0.0);
+        Matrix3::from_diagonal_element(self.identity * a.dot(b))
+            + f * a * (f * b).transpose() * self.along_f
+            + c * a * (c * b).transpose() * self.along_cofactor
+            + bend
+            + b * a.transpose() * self.transposition
+            + self.negative.lift(a, b)
+    }
+
+    /// Adds `weight` times [`Tangent::block`] of every pair of gradients to `blocks[a][b]`, `b <= a`.
+    pub(crate) fn add_blocks(&self, gradients: &[Vector3<f64>; 8], weight: f64, blocks: &mut [[Matrix3<f64>; 8]; 8]) {
+        for a in 0..8 {
+            for b in 0..=a {
+                blocks[a][b] += self.block(&gradients[a], &gradients[b]) * weight;
+            }
+        }
+    }
+}
