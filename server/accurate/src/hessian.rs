@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use plica_geometry::NodeIdx;
 
 use crate::constraints::Constraints;
-use crate::energy::Energy;
+use crate::energy::{Energy, Projection};
 
 /// Second derivatives of a sum of energies \[N/m\].
 ///
@@ -66,6 +66,40 @@ impl Hessian {
             lift: vec![Vector3::zeros(); n_nodes],
             has_motion: false,
         }
+    }
+
+    /// Second derivatives of the sum of `energies` at `x: [n_nodes]` \[m\], on the coordinates that are free.
+    ///
+    /// # Panics
+    /// If the lengths of `x` and `constraints` differ.
+    pub fn assemble(
+        energies: &[&dyn Energy],
+        constraints: &Constraints,
+        x: &[Vector3<f64>],
+        projection: Projection,
+    ) -> Self {
+        assert_eq!(x.len(), constraints.n_nodes(), "nodes");
+        let mut hessian = Self::new(constraints, energies);
+        energies.iter().for_each(|energy| energy.add_hessian(x, projection, &mut hessian));
+        hessian.finish(0.0);
+        hessian
+    }
+
+    /// `H v` for vectors at the nodes; 0 at given coordinates, and those of `v` count as 0.
+    pub fn multiply(&self, v: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let mut product = vec![Vector3::zeros(); self.block_of_node.len()];
+        for column in 0..self.n_blocks() {
+            let j = self.node_of_block(column);
+            for place in 0..self.column_starts[column + 1] - self.column_starts[column] {
+                let i = self.node_of_block(self.block_rows[self.column_starts[column] + place] as usize);
+                let block = self.block(column, place);
+                product[i] += block * v[j];
+                if place > 0 {
+                    product[j] += block.transpose() * v[i];
+                }
+            }
+        }
+        product
     }
 
     /// Adds the second derivatives of one stencil: `block(a, b)` couples `nodes[a]` and `nodes[b]` and is asked for once per
@@ -159,6 +193,18 @@ impl Hessian {
         &self.lift
     }
 
+    /// For every block the others coupled with it.
+    pub(crate) fn block_neighbours(&self) -> Vec<Vec<u32>> {
+        let mut neighbours = vec![Vec::new(); self.n_blocks()];
+        for column in 0..self.n_blocks() {
+            for &row in &self.block_rows[self.column_starts[column] + 1..self.column_starts[column + 1]] {
+                neighbours[column].push(row);
+                neighbours[row as usize].push(column as u32);
+            }
+        }
+        neighbours
+    }
+
     /// Column starts and rows of the scalar lower triangle, for the factorisation.
     pub(crate) fn scalar_pattern(&self) -> (Vec<usize>, Vec<usize>) {
         let mut starts = vec![0];
@@ -186,6 +232,12 @@ impl Hessian {
 
     fn diagonal(&self, block: usize, k: usize) -> usize {
         self.column_start(block, k)
+    }
+
+    /// Block at a place of a block column; the diagonal one filled up from its lower triangle.
+    fn block(&self, column: usize, place: usize) -> Matrix3<f64> {
+        let value = |r: usize, k: usize| self.values[self.column_start(column, k) + 3 * place - k + r];
+        if place == 0 { Matrix3::from_fn(|r, k| value(r.max(k), r.min(k))) } else { Matrix3::from_fn(value) }
     }
 
     fn add_lower(&mut self, row: u32, column: u32, block: &Matrix3<f64>) {

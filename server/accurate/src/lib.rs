@@ -15,6 +15,7 @@ mod hessian;
 mod loads;
 mod material;
 mod newton;
+mod ordering;
 mod reaction;
 mod solid;
 mod tie;

@@ -24,9 +24,9 @@ pub(crate) use volumetric::Volumetric;
 pub enum MaterialModel {
     /// `mu eps : eps + lambda/2 tr(eps)^2` with the small strain `eps = sym(F) - I`. Not invariant under rotations.
     Linear,
-    /// `mu/2 (I_C - 3) - mu ln J + lambda/4 (J^2 - 1 - 2 ln J)` \[BW08, eq. 6.28 and the text below it\]; infinite for `J <= 0`.
+    /// `mu/2 (I_C - 3) - mu ln J + lambda/4 (J^2 - 1 - 2 ln J)` \[Wri08\]; infinite for `J <= 0`.
     CompressibleNeoHookean,
-    /// `mu_s/2 (I_C - 3) + lambda_s/2 (J - alpha)^2 - mu_s/2 ln(I_C + 1)` \[SGK18, eq. 14\] with `mu_s = 4/3 mu`,
+    /// `mu_s/2 (I_C - 3) + lambda_s/2 (J - alpha)^2 - mu_s/2 ln(I_C + 1)` \[SGK18\] with `mu_s = 4/3 mu`,
     /// `lambda_s = lambda + 5/6 mu`, `alpha = 1 + 3/4 mu_s / lambda_s`, less its value at rest; finite everywhere.
     StableNeoHookean,
 }

@@ -1,5 +1,7 @@
 //! Newton's method with a line search on a sum of energies.
 
+mod report;
+
 use std::ops::ControlFlow;
 
 use nalgebra::Vector3;
@@ -8,10 +10,11 @@ use crate::constraints::Constraints;
 use crate::energy::{Energy, Projection};
 use crate::factor::{Factor, FactorError};
 use crate::hessian::Hessian;
+pub use report::{Info, Params, Progress, SolveError};
 
 /// Share of the decrease that the slope promises which a step must reach \[NW06, eq. 3.6a\].
 const SUFFICIENT_DECREASE: f64 = 1e-4;
-/// Share of the slope that may be left after a step that is judged by its slope \[HZ05, eq. 23\].
+/// Share of the slope that may be left after a step that is judged by its slope \[HZ05\].
 const SLOPE_LEFT: f64 = 0.9;
 /// Share of the energy below which its differences are rounding.
 const ROUNDING: f64 = 1e-13;
@@ -19,91 +22,6 @@ const ROUNDING: f64 = 1e-13;
 const FIRST_SHIFT: f64 = 1e-6;
 const MAX_SHIFTS: u32 = 10;
 const MAX_HALVINGS: u32 = 30;
-
-/// When to stop.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Params {
-    /// Largest force left at a free coordinate, as a share of the largest nodal force of any single energy.
-    pub tolerance: f64,
-    /// Newton steps after which the solve gives up.
-    pub max_iterations: u32,
-}
-
-impl Default for Params {
-    fn default() -> Self {
-        Self { tolerance: 1e-9, max_iterations: 100 }
-    }
-}
-
-/// How a solve went.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Info {
-    /// Residual before every Newton step and at the end, as a share of the largest nodal force.
-    pub residuals: Vec<f64>,
-    /// Newton steps.
-    pub iterations: u32,
-    /// Steps whose matrix was not positive definite, so that the projected one was used.
-    pub indefinite_steps: u32,
-    /// Halvings of steps by the line search.
-    pub halvings: u32,
-    /// Smallest `det F` of the result, where an energy has one.
-    pub smallest_jacobian: Option<f64>,
-}
-
-/// What the callback is told before every Newton step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Progress {
-    /// Newton steps taken.
-    pub iteration: u32,
-    /// Residual as a share of the largest nodal force.
-    pub residual: f64,
-}
-
-/// Why a solve has no result. `x` is left where the solve gave up.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SolveError {
-    /// Too many steps.
-    #[error(
-        "residual {residual:.1e} of the largest force after {iterations} Newton steps, {tolerance:.1e} was asked for"
-    )]
-    NotConverged {
-        /// Newton steps taken.
-        iterations: u32,
-        /// Residual left.
-        residual: f64,
-        /// Residual asked for.
-        tolerance: f64,
-    },
-    /// No step along the Newton direction helps.
-    #[error("no step helps at residual {residual:.1e} of the largest force, after {iterations} Newton steps")]
-    LineSearch {
-        /// Newton steps taken.
-        iterations: u32,
-        /// Residual left.
-        residual: f64,
-    },
-    /// The matrix cannot be made positive definite by any reasonable shift.
-    #[error("the stiffness matrix is singular after {iterations} Newton steps: is the body held well enough?")]
-    Singular {
-        /// Newton steps taken.
-        iterations: u32,
-    },
-    /// The starting point is not admissible, or holds a number that is not finite.
-    #[error("the energy is not finite after {iterations} Newton steps: inverted elements, or a load beyond reason")]
-    NotFinite {
-        /// Newton steps taken.
-        iterations: u32,
-    },
-    /// The callback asked to stop.
-    #[error("cancelled after {iterations} Newton steps")]
-    Cancelled {
-        /// Newton steps taken.
-        iterations: u32,
-    },
-    /// No memory.
-    #[error(transparent)]
-    Factor(#[from] FactorError),
-}
 
 /// Minimises sums of energies that share one sparsity and one set of given coordinates.
 pub struct Solver {
@@ -134,7 +52,7 @@ impl Solver {
     /// [`FactorError`]: no memory.
     pub fn new(constraints: &Constraints, energies: &[&dyn Energy]) -> Result<Self, FactorError> {
         let hessian = Hessian::new(constraints, energies);
-        let factor = Factor::new(&hessian)?;
+        let factor = Factor::new(&hessian, energies.iter().find_map(|e| e.rest_positions()))?;
         let zeros = || vec![Vector3::zeros(); constraints.n_nodes()];
         Ok(Self {
             hessian,
@@ -284,10 +202,11 @@ impl Solver {
 
     /// Takes the longest step that keeps the energy finite and turns no element over.
     fn follow_given(&mut self, energies: &[&dyn Energy], x: &mut [Vector3<f64>], info: &mut Info) -> bool {
+        let was_upright = energies.iter().all(|e| e.is_upright(x));
         let mut length = 1.0;
         for _ in 0..=MAX_HALVINGS {
             self.try_step(x, length);
-            let is_upright = smallest_jacobian(energies, &self.trial).is_none_or(|j| j > 0.0);
+            let is_upright = !was_upright || energies.iter().all(|e| e.is_upright(&self.trial));
             if is_upright && value(energies, &self.trial).is_finite() {
                 x.copy_from_slice(&self.trial);
                 return true;

@@ -23,7 +23,7 @@ pub const GAUSS_POINTS: [[f64; 3]; 8] = {
     points
 };
 
-/// Hexahedra of hyperelastic materials with mean dilatation \[Hug80\]\[SGK18\]:
+/// Hexahedra of hyperelastic materials with mean dilatation \[STP85\]:
 ///
 /// `W(x) = sum_e [ sum_q w_q psi(F_q) + V_e U(sum_q w_q J_q / V_e) ]`,
 ///
@@ -32,7 +32,7 @@ pub const GAUSS_POINTS: [[f64; 3]; 8] = {
 /// materials do not lock.
 #[derive(Debug, Clone)]
 pub struct Solid {
-    n_nodes: usize,
+    rest: Vec<Vector3<f64>>,
     elements: Vec<Element>,
 }
 
@@ -71,7 +71,7 @@ impl Solid {
             material.check().map_err(|error| SolidError::Material { hex, error })?;
             elements.push(Element::new(mesh, hex, Law::new(material)));
         }
-        Ok(Self { n_nodes: mesh.n_nodes(), elements })
+        Ok(Self { rest: mesh.nodes().iter().map(|x| x.coords).collect(), elements })
     }
 
     /// The mesh at rest, all of one material.
@@ -84,7 +84,7 @@ impl Solid {
 
     /// Number of nodes.
     pub fn n_nodes(&self) -> usize {
-        self.n_nodes
+        self.rest.len()
     }
 
     /// Deformation gradient at reference coordinates `xi` of a hexahedron.
@@ -134,5 +134,9 @@ impl Energy for Solid {
 
     fn is_upright(&self, x: &[Vector3<f64>]) -> bool {
         self.elements.iter().all(|e| e.model() == MaterialModel::Linear || e.smallest_jacobian(x) > 0.0)
+    }
+
+    fn rest_positions(&self) -> Option<&[Vector3<f64>]> {
+        Some(&self.rest)
     }
 }

@@ -1,4 +1,4 @@
-//! Local part of the compressible Neo-Hookean material, `mu/2 (I_C - 3) - mu ln J` \[BW08, eq. 6.28\].
+//! Local part of the compressible Neo-Hookean material, `mu/2 (I_C - 3) - mu ln J` \[Wri08\].
 
 use super::Slopes;
 use super::deformation::{Deformation, log_remainder};

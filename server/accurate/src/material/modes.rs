@@ -13,7 +13,7 @@ pub(super) struct NegativeModes {
 }
 
 impl NegativeModes {
-    /// Of `H = identity 1 + along_f F (x) F + along_cofactor C (x) C + curvature d^2 J` \[SGK19, section 4\]. With
+    /// Of `H = identity 1 + along_f F (x) F + along_cofactor C (x) C + curvature d^2 J` \[SGK19\]. With
     /// `F = U diag(s) V^T`, `U` and `V` rotations:
     ///
     /// * flips `U (e_i e_j^T + e_j e_i^T) V^T / sqrt 2` and twists `U (e_i e_j^T - e_j e_i^T) V^T / sqrt 2` have eigenvalues

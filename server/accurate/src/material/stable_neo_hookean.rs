@@ -1,7 +1,7 @@
 //! Local part of the stable Neo-Hookean material \[SGK18\], finite for every `F`:
 //! `2/3 mu (I_C - 3) - 2/3 mu ln((I_C + 1)/4) - mu (J - 1) + 5/12 mu (J - 1)^2`.
 //!
-//! With the volumetric part `lambda/2 (J - 1)^2` this is \[SGK18, eq. 14\] for `mu_s = 4/3 mu`, `lambda_s = lambda + 5/6 mu`,
+//! With the volumetric part `lambda/2 (J - 1)^2` this is \[SGK18\] for `mu_s = 4/3 mu`, `lambda_s = lambda + 5/6 mu`,
 //! `alpha = 1 + 3/4 mu_s/lambda_s`, less its value at rest: `lambda_s/2 (J - alpha)^2 = lambda_s/2 (J - 1)^2 - mu (J - 1) +
 //! const`. So divided, the local part is stable by itself; with all of `lambda_s` in the volumetric part its bulk modulus at
 //! rest would be `-mu/6`.

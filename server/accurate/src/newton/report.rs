@@ -1,0 +1,88 @@
+//! What a solve is asked for, what it tells and how it fails.
+
+use crate::factor::FactorError;
+
+/// When to stop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Params {
+    /// Largest force left at a free coordinate, as a share of the largest nodal force of any single energy.
+    pub tolerance: f64,
+    /// Newton steps after which the solve gives up.
+    pub max_iterations: u32,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self { tolerance: 1e-9, max_iterations: 100 }
+    }
+}
+
+/// How a solve went.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Info {
+    /// Residual before every Newton step and at the end, as a share of the largest nodal force.
+    pub residuals: Vec<f64>,
+    /// Newton steps.
+    pub iterations: u32,
+    /// Steps whose matrix was not positive definite, so that the projected one was used.
+    pub indefinite_steps: u32,
+    /// Halvings of steps by the line search.
+    pub halvings: u32,
+    /// Smallest `det F` of the result, where an energy has one.
+    pub smallest_jacobian: Option<f64>,
+}
+
+/// What the callback is told before every Newton step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// Newton steps taken.
+    pub iteration: u32,
+    /// Residual as a share of the largest nodal force.
+    pub residual: f64,
+}
+
+/// Why a solve has no result. `x` is left where the solve gave up.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// Too many steps.
+    #[error(
+        "residual {residual:.1e} of the largest force after {iterations} Newton steps, {tolerance:.1e} was asked for"
+    )]
+    NotConverged {
+        /// Newton steps taken.
+        iterations: u32,
+        /// Residual left.
+        residual: f64,
+        /// Residual asked for.
+        tolerance: f64,
+    },
+    /// No step along the Newton direction helps.
+    #[error("no step helps at residual {residual:.1e} of the largest force, after {iterations} Newton steps")]
+    LineSearch {
+        /// Newton steps taken.
+        iterations: u32,
+        /// Residual left.
+        residual: f64,
+    },
+    /// The matrix cannot be made positive definite by any reasonable shift.
+    #[error("the stiffness matrix is singular after {iterations} Newton steps: is the body held well enough?")]
+    Singular {
+        /// Newton steps taken.
+        iterations: u32,
+    },
+    /// The starting point is not admissible, or holds a number that is not finite.
+    #[error("the energy is not finite after {iterations} Newton steps: inverted elements, or a load beyond reason")]
+    NotFinite {
+        /// Newton steps taken.
+        iterations: u32,
+    },
+    /// The callback asked to stop.
+    #[error("cancelled after {iterations} Newton steps")]
+    Cancelled {
+        /// Newton steps taken.
+        iterations: u32,
+    },
+    /// No memory.
+    #[error(transparent)]
+    Factor(#[from] FactorError),
+}
