@@ -4,7 +4,7 @@ mod glb;
 mod vtu;
 
 pub use glb::{glb_bytes, write_glb};
-pub use vtu::{PointField, write_vtu};
+pub use vtu::{Field, write_vtu};
 
 use std::path::{Path, PathBuf};
 
@@ -19,15 +19,17 @@ pub enum ExportError {
         /// What the system says.
         source: std::io::Error,
     },
-    /// A field does not hold one value per node.
-    #[error("point field `{name}` holds {n_values} values for {n_nodes} nodes")]
+    /// A field does not hold one value per node or hexahedron.
+    #[error("field `{name}` holds {n_values} values for {n_expected} {of}")]
     FieldLength {
         /// The field.
         name: String,
         /// Its number of values.
         n_values: usize,
-        /// Number of nodes.
-        n_nodes: usize,
+        /// How many it should hold.
+        n_expected: usize,
+        /// Of what: nodes or hexahedra.
+        of: &'static str,
     },
     /// The VTK writer refused the data.
     #[error("cannot encode VTU: {0}")]

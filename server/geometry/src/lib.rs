@@ -8,6 +8,7 @@ mod clusters;
 mod embedding;
 pub mod export;
 mod hex_mesh;
+pub mod import;
 mod index;
 pub mod isoparametric;
 mod locate;

@@ -4,9 +4,9 @@
 mod common;
 
 use common::{default_skin, default_wedge};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use plica_geometry::Skin;
-use plica_geometry::export::{ExportError, PointField, glb_bytes, write_glb, write_vtu};
+use plica_geometry::export::{ExportError, Field, glb_bytes, write_glb, write_vtu};
 use vtkio::model::{Attribute, CellType, DataSet, Piece};
 
 fn as_f32(x: [f64; 3]) -> [f32; 3] {
@@ -59,8 +59,12 @@ fn the_vtu_is_read_back_with_its_fields() {
     let path = folder.path().join("wedge.vtu");
     let heights: Vec<f64> = mesh.nodes().iter().map(|x| x.z).collect();
     let shifts: Vec<_> = mesh.nodes().iter().map(|x| 0.5 * x.coords).collect();
-    let fields = [PointField::Scalars("height_m", &heights), PointField::Vectors("displacement_m", &shifts)];
-    write_vtu(&path, &mesh, &fields).unwrap();
+    let stress: Vec<_> =
+        (0..128).map(|i| Matrix3::from_fn(|r, c| f64::from(100 * i + 10 * r as i32 + c as i32))).collect();
+    let volumes: Vec<f64> = (0..128).map(f64::from).collect();
+    let fields = [Field::Scalars("height_m", &heights), Field::Vectors("displacement_m", &shifts)];
+    let cell_fields = [Field::Scalars("number", &volumes), Field::Tensors("stress_pa", &stress)];
+    write_vtu(&path, &mesh, &fields, &cell_fields).unwrap();
 
     let read = vtkio::Vtk::import(&path).unwrap();
     let DataSet::UnstructuredGrid { pieces, .. } = read.data else { panic!("another kind of grid") };
@@ -71,20 +75,26 @@ fn the_vtu_is_read_back_with_its_fields() {
     let (connectivity, offsets) = piece.cells.cell_verts.clone().into_xml();
     assert_eq!(connectivity, mesh.hexes().iter().flatten().map(|n| u64::from(n.0)).collect::<Vec<_>>());
     assert_eq!(offsets.last(), Some(&1024));
-    let field = |k: usize| match &piece.data.point[k] {
+    let field = |attribute: &Attribute| match attribute {
         Attribute::DataArray(array) => (array.name.clone(), array.data.clone().into_vec::<f64>().unwrap()),
         Attribute::Field { .. } => panic!("a legacy field"),
     };
-    assert_eq!(field(0), ("height_m".to_owned(), heights));
-    assert_eq!(field(1).0, "displacement_m");
-    assert_eq!(field(1).1, flat.iter().map(|x| 0.5 * x).collect::<Vec<_>>());
+    assert_eq!(field(&piece.data.point[0]), ("height_m".to_owned(), heights));
+    assert_eq!(field(&piece.data.point[1]), ("displacement_m".to_owned(), flat.iter().map(|x| 0.5 * x).collect()));
+    assert_eq!(field(&piece.data.cell[0]), ("number".to_owned(), volumes));
+    let (name, rows) = field(&piece.data.cell[1]);
+    assert_eq!((name.as_str(), rows.len()), ("stress_pa", 9 * 128));
+    assert_eq!(rows[9..18], [100.0, 101.0, 102.0, 110.0, 111.0, 112.0, 120.0, 121.0, 122.0], "row by row");
 }
 
 #[test]
 fn a_field_of_the_wrong_length_is_refused() {
     let path = std::path::Path::new("never-written.vtu");
-    let error = write_vtu(path, &default_wedge(), &[PointField::Scalars("height_m", &[1.0, 2.0])]).unwrap_err();
-    assert_eq!(error.to_string(), "point field `height_m` holds 2 values for 225 nodes");
+    let field = [Field::Scalars("height_m", &[1.0, 2.0])];
+    let error = write_vtu(path, &default_wedge(), &field, &[]).unwrap_err();
+    assert_eq!(error.to_string(), "field `height_m` holds 2 values for 225 nodes");
+    let error = write_vtu(path, &default_wedge(), &[], &field).unwrap_err();
+    assert_eq!(error.to_string(), "field `height_m` holds 2 values for 128 hexahedra");
     assert!(!path.exists());
 }
 

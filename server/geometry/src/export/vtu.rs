@@ -1,8 +1,8 @@
-//! VTK unstructured grid (XML) of a hexahedral mesh with fields at its nodes: ParaView opens it.
+//! VTK unstructured grid (XML) of a hexahedral mesh with fields at its nodes and in its cells: ParaView opens it.
 
 use std::path::Path;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use vtkio::model::{
     Attribute, Attributes, ByteOrder, CellType, Cells, DataSet, UnstructuredGridPiece, Version, VertexNumbers,
 };
@@ -11,19 +11,21 @@ use vtkio::{IOBuffer, Vtk};
 use super::{ExportError, write_file};
 use crate::hex_mesh::HexMesh;
 
-/// A named field with one value per node.
+/// A named field with one value per node or per hexahedron.
 #[derive(Clone, Copy, Debug)]
-pub enum PointField<'a> {
-    /// Numbers `[n_nodes]`.
+pub enum Field<'a> {
+    /// Numbers `[n]`.
     Scalars(&'a str, &'a [f64]),
-    /// Vectors `[n_nodes]`.
+    /// Vectors `[n]`.
     Vectors(&'a str, &'a [Vector3<f64>]),
+    /// Tensors `[n]`; nine components, row by row.
+    Tensors(&'a str, &'a [Matrix3<f64>]),
 }
 
-impl PointField<'_> {
+impl Field<'_> {
     fn name(&self) -> &str {
         match self {
-            Self::Scalars(name, _) | Self::Vectors(name, _) => name,
+            Self::Scalars(name, _) | Self::Vectors(name, _) | Self::Tensors(name, _) => name,
         }
     }
 
@@ -31,6 +33,7 @@ impl PointField<'_> {
         match self {
             Self::Scalars(_, values) => values.len(),
             Self::Vectors(_, values) => values.len(),
+            Self::Tensors(_, values) => values.len(),
         }
     }
 
@@ -41,27 +44,36 @@ impl PointField<'_> {
                 let flat: Vec<f64> = values.iter().flat_map(|v| [v.x, v.y, v.z]).collect();
                 Attribute::vectors(name).with_data(flat)
             }
+            Self::Tensors(name, values) => {
+                // nalgebra keeps columns together: the transpose's columns are the rows.
+                let flat: Vec<f64> = values.iter().flat_map(|t| t.transpose().data.0).flatten().collect();
+                Attribute::tensors(name).with_data(flat)
+            }
         }
     }
 }
 
-/// Writes `mesh` at its rest positions \[m\] with `fields` to `path` (`.vtu`); the file is little-endian, `f64`.
+/// Writes `mesh` at its rest positions \[m\] to `path` (`.vtu`), with fields at the nodes and in the hexahedra; the file is
+/// little-endian, `f64`. In ParaView "Warp By Vector" with a displacement field shows the deformed mesh.
 ///
 /// # Errors
-/// [`ExportError`]: a field of another length than the mesh's nodes, or a file that cannot be written.
-pub fn write_vtu(path: &Path, mesh: &HexMesh, fields: &[PointField<'_>]) -> Result<(), ExportError> {
-    let n_nodes = mesh.n_nodes();
-    if let Some(field) = fields.iter().find(|field| field.n_values() != n_nodes) {
-        let (name, n_values) = (field.name().to_owned(), field.n_values());
-        return Err(ExportError::FieldLength { name, n_values, n_nodes });
-    }
+/// [`ExportError`]: a field of another length than nodes or hexahedra, or a file that cannot be written.
+pub fn write_vtu(
+    path: &Path,
+    mesh: &HexMesh,
+    point_fields: &[Field<'_>],
+    cell_fields: &[Field<'_>],
+) -> Result<(), ExportError> {
+    check_lengths(point_fields, mesh.n_nodes(), "nodes")?;
+    check_lengths(cell_fields, mesh.n_hexes(), "hexahedra")?;
+    let attributes = |fields: &[Field<'_>]| fields.iter().map(|field| field.to_attribute()).collect();
     let piece = UnstructuredGridPiece {
         points: flat_points(mesh.nodes()),
         cells: cells(mesh),
-        data: Attributes { point: fields.iter().map(|field| field.to_attribute()).collect(), cell: Vec::new() },
+        data: Attributes { point: attributes(point_fields), cell: attributes(cell_fields) },
     };
     let vtk = Vtk {
-        version: Version::new((1, 0)),
+        version: Version::new_xml(1, 0),
         title: "Plica".to_owned(),
         byte_order: ByteOrder::LittleEndian,
         data: DataSet::inline(piece),
@@ -70,6 +82,16 @@ pub fn write_vtu(path: &Path, mesh: &HexMesh, fields: &[PointField<'_>]) -> Resu
     let mut bytes = Vec::new();
     vtk.write_xml(&mut bytes).map_err(|error| ExportError::Vtk(error.to_string()))?;
     write_file(path, &bytes)
+}
+
+fn check_lengths(fields: &[Field<'_>], n_expected: usize, of: &'static str) -> Result<(), ExportError> {
+    match fields.iter().find(|field| field.n_values() != n_expected) {
+        Some(field) => {
+            let (name, n_values) = (field.name().to_owned(), field.n_values());
+            Err(ExportError::FieldLength { name, n_values, n_expected, of })
+        }
+        None => Ok(()),
+    }
 }
 
 fn flat_points(points: &[Point3<f64>]) -> IOBuffer {

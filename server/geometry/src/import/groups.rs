@@ -1,0 +1,51 @@
+//! Named parts of a mesh.
+
+use crate::index::{HexIdx, NodeIdx};
+
+/// What a file calls a part of its mesh.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Group {
+    /// Its name; a physical group of Gmsh without one is called by its number.
+    pub name: String,
+    /// 3 for volumes, 2 for surfaces, 1 for curves, 0 for points.
+    pub dimension: u8,
+    /// Nodes of its cells that belong to hexahedra, in increasing order.
+    pub nodes: Vec<NodeIdx>,
+    /// Its quads, each with its nodes in increasing order, in increasing order; for surfaces.
+    pub faces: Vec<[NodeIdx; 4]>,
+    /// Its hexahedra in increasing order; for volumes.
+    pub hexes: Vec<HexIdx>,
+}
+
+/// All groups of a file, in its order.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Groups {
+    groups: Vec<Group>,
+}
+
+impl Groups {
+    pub(super) fn new(groups: Vec<Group>) -> Self {
+        Self { groups }
+    }
+
+    /// All of them.
+    pub fn iter(&self) -> impl Iterator<Item = &Group> {
+        self.groups.iter()
+    }
+
+    /// The group of hexahedra of that name.
+    pub fn volume(&self, name: &str) -> Option<&Group> {
+        self.iter().find(|group| group.name == name && group.dimension == 3)
+    }
+
+    /// The group of quads of that name.
+    pub fn surface(&self, name: &str) -> Option<&Group> {
+        self.iter().find(|group| group.name == name && group.dimension == 2)
+    }
+
+    /// The group of that name of highest dimension below 3, else the volume: what a support or a probe means.
+    pub fn nodes(&self, name: &str) -> Option<&Group> {
+        let named = self.iter().filter(|group| group.name == name);
+        named.max_by_key(|group| if group.dimension == 3 { -1 } else { i32::from(group.dimension) })
+    }
+}

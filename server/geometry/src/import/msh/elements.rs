@@ -1,0 +1,86 @@
+//! Element types of MSH files.
+
+use crate::import::assemble::Shape;
+
+/// An element type.
+#[derive(Debug)]
+pub(super) struct Element {
+    /// Its number in MSH files.
+    pub(super) code: i32,
+    pub(super) name: &'static str,
+    pub(super) n_nodes: usize,
+    pub(super) kind: Kind,
+}
+
+/// What becomes of an element.
+#[derive(Debug)]
+pub(super) enum Kind {
+    /// It is taken by its corners.
+    Taken(Shape),
+    /// Another volume of first order.
+    OtherVolume,
+    /// A volume with nodes on its edges.
+    HighOrder,
+}
+
+impl Element {
+    pub(super) fn by_code(code: i32) -> Option<&'static Self> {
+        ELEMENTS.iter().find(|element| element.code == code)
+    }
+
+    pub(super) fn advice(&self) -> &'static str {
+        match self.kind {
+            Kind::HighOrder => "save it with first order: in Gmsh Mesh.ElementOrder = 1 (Mesh > Set order 1)",
+            _ => {
+                "mesh with hexahedra only: in Gmsh transfinite volumes with Recombine, an extrusion with Recombine, or \
+                 Mesh.SubdivisionAlgorithm = 2"
+            }
+        }
+    }
+}
+
+const fn taken(code: i32, name: &'static str, n_nodes: usize, shape: Shape) -> Element {
+    Element { code, name, n_nodes, kind: Kind::Taken(shape) }
+}
+
+const fn other(code: i32, name: &'static str, n_nodes: usize) -> Element {
+    Element { code, name, n_nodes, kind: Kind::OtherVolume }
+}
+
+const fn high(code: i32, name: &'static str, n_nodes: usize) -> Element {
+    Element { code, name, n_nodes, kind: Kind::HighOrder }
+}
+
+/// The types that Gmsh writes up to third order; corners come first in each.
+const ELEMENTS: [Element; 30] = [
+    taken(15, "points", 1, Shape::Point),
+    taken(1, "2-node lines", 2, Shape::Line),
+    taken(8, "3-node lines", 3, Shape::Line),
+    taken(26, "4-node lines", 4, Shape::Line),
+    taken(27, "5-node lines", 5, Shape::Line),
+    taken(2, "3-node triangles", 3, Shape::Triangle),
+    taken(9, "6-node triangles", 6, Shape::Triangle),
+    taken(20, "9-node triangles", 9, Shape::Triangle),
+    taken(21, "10-node triangles", 10, Shape::Triangle),
+    taken(3, "4-node quads", 4, Shape::Quad),
+    taken(10, "9-node quads", 9, Shape::Quad),
+    taken(16, "8-node quads", 8, Shape::Quad),
+    taken(36, "16-node quads", 16, Shape::Quad),
+    taken(5, "8-node hexahedra", 8, Shape::Hexahedron),
+    other(4, "4-node tetrahedra", 4),
+    other(6, "6-node prisms", 6),
+    other(7, "5-node pyramids", 5),
+    high(11, "10-node tetrahedra (second order)", 10),
+    high(12, "27-node hexahedra (second order)", 27),
+    high(13, "18-node prisms (second order)", 18),
+    high(14, "14-node pyramids (second order)", 14),
+    high(17, "20-node hexahedra (second order)", 20),
+    high(18, "15-node prisms (second order)", 15),
+    high(19, "13-node pyramids (second order)", 13),
+    high(29, "20-node tetrahedra (third order)", 20),
+    high(30, "35-node tetrahedra (fourth order)", 35),
+    high(90, "40-node prisms (third order)", 40),
+    high(92, "64-node hexahedra (third order)", 64),
+    high(93, "125-node hexahedra (fourth order)", 125),
+    high(118, "30-node pyramids (third order)", 30),
+];
