@@ -41,4 +41,11 @@ impl Constraints {
         let given = self.is_given[node];
         Vector3::from_fn(|k, _| if given[k] { self.target[node][k] - x[k] } else { 0.0 })
     }
+
+    /// Sets the given coordinates of `x` to their targets, without the rounding of a step.
+    pub(crate) fn place(&self, x: &mut [Vector3<f64>]) {
+        for (x, (given, target)) in x.iter_mut().zip(self.is_given.iter().zip(&self.target)) {
+            (0..3).filter(|&k| given[k]).for_each(|k| x[k] = target[k]);
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! Newton's method with a line search on a sum of energies.
 
+mod acceptance;
 mod report;
 
 use std::ops::ControlFlow;
@@ -10,16 +11,15 @@ use crate::constraints::Constraints;
 use crate::energy::{Energy, Projection};
 use crate::factor::{Factor, FactorError};
 use crate::hessian::Hessian;
+use acceptance::{Judgement, Start, Total};
 pub use report::{Info, Params, Progress, SolveError};
 
-/// Share of the decrease that the slope promises which a step must reach \[NW06, eq. 3.6a\].
-const SUFFICIENT_DECREASE: f64 = 1e-4;
 /// Share of the slope that may be left after a step that is judged by its slope \[HZ05\].
 const SLOPE_LEFT: f64 = 0.9;
-/// Share of the energy below which its differences are rounding.
-const ROUNDING: f64 = 1e-13;
 /// First shift of a matrix that stays indefinite, as a share of its mean diagonal; every further one is ten times larger.
 const FIRST_SHIFT: f64 = 1e-6;
+/// Forces below this share of stiffness times position are rounding.
+const FORCE_ROUNDING: f64 = 32.0 * f64::EPSILON;
 const MAX_SHIFTS: u32 = 10;
 const MAX_HALVINGS: u32 = 30;
 
@@ -33,12 +33,14 @@ pub struct Solver {
     direction: Vec<Vector3<f64>>,
     motion: Vec<Vector3<f64>>,
     trial: Vec<Vector3<f64>>,
+    /// Mean diagonal of the matrix that was factorised last \[N/m\].
+    stiffness: f64,
 }
 
-/// Residual and what it is measured against.
 #[derive(Debug, Clone, Copy)]
 struct Residual {
-    /// Largest force at a free coordinate over the largest nodal force of a single energy.
+    /// Largest force at a free node over the largest nodal force of a single energy. Where forces are mere rounding, as
+    /// after a rigid motion, they count as within the tolerance.
     relative: f64,
     /// Norm of the force at free coordinates \[N\].
     norm: f64,
@@ -63,6 +65,7 @@ impl Solver {
             direction: zeros(),
             motion: zeros(),
             trial: zeros(),
+            stiffness: 0.0,
         })
     }
 
@@ -95,9 +98,9 @@ impl Solver {
         loop {
             let iterations = info.iterations;
             let moves = self.find_motion(constraints, x);
-            let residual = self.find_residual(energies, constraints, x);
+            let residual = self.find_residual(energies, constraints, params.tolerance, x);
             info.residuals.push(residual.relative);
-            if !residual.relative.is_finite() {
+            if !(residual.relative.is_finite() && (iterations > 0 || Total::of(energies, x).value.is_finite())) {
                 return Err(SolveError::NotFinite { iterations });
             }
             if observer(Progress { iteration: iterations, residual: residual.relative }).is_break() {
@@ -112,7 +115,7 @@ impl Solver {
             }
             self.find_direction(energies, constraints, moves, x, &mut info)?;
             let went = if moves {
-                self.follow_given(energies, x, &mut info)
+                self.follow_given(energies, constraints, x, &mut info)
             } else {
                 self.search_line(energies, constraints, residual, x, &mut info)
             };
@@ -135,7 +138,13 @@ impl Solver {
         moves
     }
 
-    fn find_residual(&mut self, energies: &[&dyn Energy], constraints: &Constraints, x: &[Vector3<f64>]) -> Residual {
+    fn find_residual(
+        &mut self,
+        energies: &[&dyn Energy],
+        constraints: &Constraints,
+        tolerance: f64,
+        x: &[Vector3<f64>],
+    ) -> Residual {
         let mut largest_force = 0.0_f64;
         self.gradient.fill(Vector3::zeros());
         for energy in energies {
@@ -149,7 +158,9 @@ impl Solver {
         clear_given(&mut self.gradient, constraints);
         let largest = self.gradient.iter().map(Vector3::norm).fold(0.0, nan_max);
         let norm = self.gradient.iter().map(Vector3::norm_squared).sum::<f64>().sqrt();
-        Residual { relative: if largest == 0.0 { 0.0 } else { largest / largest_force }, norm }
+        let rounding = FORCE_ROUNDING * self.stiffness * x.iter().map(Vector3::amax).fold(0.0, f64::max);
+        let scale = largest_force.max(rounding / tolerance);
+        Residual { relative: if largest == 0.0 { 0.0 } else { largest / scale }, norm }
     }
 
     /// `direction = -H^-1 (gradient + H_free,given motion)`.
@@ -183,13 +194,13 @@ impl Solver {
         for energy in energies {
             energy.add_hessian(x, projection, &mut self.hessian);
         }
-        let scale = self.hessian.mean_diagonal();
-        self.hessian.finish(scale);
+        self.stiffness = self.hessian.mean_diagonal();
+        self.hessian.finish(self.stiffness);
         self.factor.factorise(&self.hessian).is_ok()
     }
 
     fn factorise_shifted(&mut self) -> bool {
-        let mut shift = FIRST_SHIFT * self.hessian.mean_diagonal();
+        let mut shift = FIRST_SHIFT * self.stiffness;
         for _ in 0..MAX_SHIFTS {
             self.hessian.add_diagonal(shift);
             if self.factor.factorise(&self.hessian).is_ok() {
@@ -201,13 +212,22 @@ impl Solver {
     }
 
     /// Takes the longest step that keeps the energy finite and turns no element over.
-    fn follow_given(&mut self, energies: &[&dyn Energy], x: &mut [Vector3<f64>], info: &mut Info) -> bool {
+    fn follow_given(
+        &mut self,
+        energies: &[&dyn Energy],
+        constraints: &Constraints,
+        x: &mut [Vector3<f64>],
+        info: &mut Info,
+    ) -> bool {
         let was_upright = energies.iter().all(|e| e.is_upright(x));
         let mut length = 1.0;
         for _ in 0..=MAX_HALVINGS {
             self.try_step(x, length);
+            if length == 1.0 {
+                constraints.place(&mut self.trial);
+            }
             let is_upright = !was_upright || energies.iter().all(|e| e.is_upright(&self.trial));
-            if is_upright && value(energies, &self.trial).is_finite() {
+            if is_upright && Total::of(energies, &self.trial).value.is_finite() {
                 x.copy_from_slice(&self.trial);
                 return true;
             }
@@ -226,21 +246,19 @@ impl Solver {
         x: &mut [Vector3<f64>],
         info: &mut Info,
     ) -> bool {
-        let has_potential = energies.iter().all(|e| e.has_potential());
-        let energy = value(energies, x);
-        let slope: f64 = self.gradient.iter().zip(&self.direction).map(|(g, p)| g.dot(p)).sum();
+        let start = Start {
+            total: Total::of(energies, x),
+            slope: self.gradient.iter().zip(&self.direction).map(|(g, p)| g.dot(p)).sum(),
+            norm: residual.norm,
+            has_potential: energies.iter().all(|e| e.has_potential()),
+        };
         let mut length = 1.0;
         for _ in 0..=MAX_HALVINGS {
             self.try_step(x, length);
-            let trial = value(energies, &self.trial);
-            let accepted = if !trial.is_finite() {
-                false
-            } else if has_potential && trial <= energy + SUFFICIENT_DECREASE * length * slope {
-                true
-            } else if has_potential && trial > energy + ROUNDING * (energy.abs() + slope.abs()) {
-                false
-            } else {
-                self.is_better_by_slope(energies, constraints, has_potential, slope, residual)
+            let accepted = match start.judge(&Total::of(energies, &self.trial), length) {
+                Judgement::Accept => true,
+                Judgement::Refuse => false,
+                Judgement::AskForces => self.is_better_by_forces(energies, constraints, &start),
             };
             if accepted {
                 x.copy_from_slice(&self.trial);
@@ -252,22 +270,15 @@ impl Solver {
         false
     }
 
-    /// Judges `trial` by its forces. Overwrites the gradient only of a step that is not taken again.
-    fn is_better_by_slope(
-        &mut self,
-        energies: &[&dyn Energy],
-        constraints: &Constraints,
-        has_potential: bool,
-        slope: f64,
-        residual: Residual,
-    ) -> bool {
+    /// Judges `trial` by its forces; leaves the gradient as it was.
+    fn is_better_by_forces(&mut self, energies: &[&dyn Energy], constraints: &Constraints, start: &Start) -> bool {
         let gradient = self.gradient.clone();
         let trial = std::mem::take(&mut self.trial);
-        let found = self.find_residual(energies, constraints, &trial);
-        let left: f64 = self.gradient.iter().zip(&self.direction).map(|(g, p)| g.dot(p)).sum();
+        let found = self.find_residual(energies, constraints, 1.0, &trial);
+        let slope_left: f64 = self.gradient.iter().zip(&self.direction).map(|(g, p)| g.dot(p)).sum();
         self.trial = trial;
         self.gradient = gradient;
-        if has_potential { left.abs() <= SLOPE_LEFT * slope.abs() } else { found.norm < residual.norm }
+        if start.has_potential { slope_left.abs() <= SLOPE_LEFT * start.slope.abs() } else { found.norm < start.norm }
     }
 
     fn try_step(&mut self, x: &[Vector3<f64>], length: f64) {
@@ -275,10 +286,6 @@ impl Solver {
             *trial = x + p * length;
         }
     }
-}
-
-fn value(energies: &[&dyn Energy], x: &[Vector3<f64>]) -> f64 {
-    energies.iter().map(|e| e.value(x)).sum()
 }
 
 fn smallest_jacobian(energies: &[&dyn Energy], x: &[Vector3<f64>]) -> Option<f64> {

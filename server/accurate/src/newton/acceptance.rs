@@ -1,0 +1,64 @@
+//! Which steps a line search takes.
+
+use nalgebra::Vector3;
+
+use crate::energy::Energy;
+
+/// Share of the decrease that the slope promises which a step must reach \[NW06, eq. 3.6a\].
+const SUFFICIENT_DECREASE: f64 = 1e-4;
+/// Share of the energies below which their differences are rounding.
+const ROUNDING: f64 = 1e-13;
+
+/// Sum of energies, and of their magnitudes \[J\].
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Total {
+    pub(super) value: f64,
+    magnitude: f64,
+}
+
+impl Total {
+    pub(super) fn of(energies: &[&dyn Energy], x: &[Vector3<f64>]) -> Self {
+        let zero = Self { value: 0.0, magnitude: 0.0 };
+        energies
+            .iter()
+            .map(|e| e.value(x))
+            .fold(zero, |sum, value| Self { value: sum.value + value, magnitude: sum.magnitude + value.abs() })
+    }
+}
+
+/// Where a line search begins.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Start {
+    pub(super) total: Total,
+    /// Derivative of the energy along the step \[J\].
+    pub(super) slope: f64,
+    /// Norm of the force at free coordinates \[N\].
+    pub(super) norm: f64,
+    pub(super) has_potential: bool,
+}
+
+/// What energies say of a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Judgement {
+    Accept,
+    Refuse,
+    /// Nothing: there is no potential, or the difference is rounding.
+    AskForces,
+}
+
+impl Start {
+    pub(super) fn judge(&self, trial: &Total, length: f64) -> Judgement {
+        let rounding = ROUNDING * (self.total.magnitude + self.slope.abs());
+        if !trial.value.is_finite() {
+            Judgement::Refuse
+        } else if !self.has_potential {
+            Judgement::AskForces
+        } else if trial.value <= self.total.value + SUFFICIENT_DECREASE * length * self.slope {
+            Judgement::Accept
+        } else if trial.value > self.total.value + rounding {
+            Judgement::Refuse
+        } else {
+            Judgement::AskForces
+        }
+    }
+}
