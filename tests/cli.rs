@@ -226,10 +226,11 @@ fn the_demo_reports_and_writes_a_picture_and_a_mesh() {
     assert_eq!(start("glb"), b"glTF");
 }
 
-/// `plicad serve` on a free port; ended when dropped.
+/// `plicad serve` on a free port with a data folder of its own; ended when dropped.
 struct Daemon {
     process: Child,
     endpoint: String,
+    _data: TempDir,
 }
 
 impl Daemon {
@@ -237,8 +238,10 @@ impl Daemon {
         let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
         let endpoint = format!("tcp/127.0.0.1:{port}");
         let mut command = Command::new(program("plicad"));
-        let process = command.args(["serve", "--listen", &endpoint]).stderr(Stdio::null()).spawn().unwrap();
-        let daemon = Self { process, endpoint };
+        let data = TempDir::new().unwrap();
+        command.args(["serve", "--listen", &endpoint, "--data", data.path().to_str().unwrap()]);
+        let process = command.stderr(Stdio::null()).spawn().unwrap();
+        let daemon = Self { process, endpoint, _data: data };
         let deadline = Instant::now() + Duration::from_secs(60);
         while !daemon.plica(&["status"]).status.success() {
             assert!(Instant::now() < deadline, "plicad never answered");

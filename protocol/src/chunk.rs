@@ -43,9 +43,17 @@ pub fn offset_of(parameters: &str) -> Result<u64, ErrorReply> {
 
 /// The piece of `whole` from `offset` on. The end itself gives an empty piece; beyond it errors with `bad_offset`.
 pub fn piece(whole: &[u8], offset: u64) -> Result<&[u8], ErrorReply> {
-    let start = usize::try_from(offset).ok().filter(|start| *start <= whole.len());
-    let start = start.ok_or_else(|| bad_offset(&offset.to_string(), &format!("the end is {}", whole.len())))?;
+    check_offset(offset, whole.len() as u64)?;
+    let start = offset as usize;
     Ok(&whole[start..whole.len().min(start + CHUNK_BYTES)])
+}
+
+/// Refuses an offset beyond the end, with `bad_offset`.
+pub fn check_offset(offset: u64, total_bytes: u64) -> Result<(), ErrorReply> {
+    if offset <= total_bytes {
+        return Ok(());
+    }
+    Err(bad_offset(&offset.to_string(), &format!("the end is {total_bytes}")))
 }
 
 fn bad_offset(found: &str, why: &str) -> ErrorReply {

@@ -10,6 +10,7 @@
 mod bytes;
 pub mod chunk;
 mod error;
+pub mod jobs;
 pub mod keys;
 pub mod order;
 pub mod pose;

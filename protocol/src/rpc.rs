@@ -26,11 +26,36 @@ pub enum Method {
     Snapshot,
     /// Returns to a kept state. Request [`RestoreRequest`], reply [`StateReply`].
     Restore,
+    /// Queues a job. Request [`crate::jobs::JobSubmitRequest`], reply [`crate::jobs::JobSubmitReply`].
+    JobSubmit,
+    /// All jobs. Request `{}`, reply [`crate::jobs::JobListReply`].
+    JobList,
+    /// One job. Request [`crate::jobs::JobRequest`], reply [`crate::jobs::Job`].
+    JobGet,
+    /// Ends a job that waits or runs. Request [`crate::jobs::JobRequest`], reply [`crate::jobs::Job`].
+    JobCancel,
+    /// Queues a failed, cancelled or paused job again. Request [`crate::jobs::JobRequest`], reply [`crate::jobs::Job`].
+    JobResume,
+    /// A result, in pieces. Request [`crate::jobs::JobFetchRequest`], reply bytes with a [`crate::chunk::ChunkHeader`].
+    JobFetch,
 }
 
 impl Method {
     /// All methods.
-    pub const ALL: [Self; 6] = [Self::Reset, Self::Pause, Self::Resume, Self::Step, Self::Snapshot, Self::Restore];
+    pub const ALL: [Self; 12] = [
+        Self::Reset,
+        Self::Pause,
+        Self::Resume,
+        Self::Step,
+        Self::Snapshot,
+        Self::Restore,
+        Self::JobSubmit,
+        Self::JobList,
+        Self::JobGet,
+        Self::JobCancel,
+        Self::JobResume,
+        Self::JobFetch,
+    ];
 
     /// The last part of the key.
     pub fn name(self) -> &'static str {
@@ -41,7 +66,18 @@ impl Method {
             Self::Step => "step",
             Self::Snapshot => "snapshot",
             Self::Restore => "restore",
+            Self::JobSubmit => "job_submit",
+            Self::JobList => "job_list",
+            Self::JobGet => "job_get",
+            Self::JobCancel => "job_cancel",
+            Self::JobResume => "job_resume",
+            Self::JobFetch => "job_fetch",
         }
+    }
+
+    /// True if it is about jobs and not about the simulation.
+    pub fn is_about_jobs(self) -> bool {
+        self.name().starts_with("job_")
     }
 
     /// The method of that name. Errors with `rpc_unknown`.
@@ -197,6 +233,18 @@ pub enum ErrorCode {
     UnknownObject,
     /// A snapshot that does not exist (any more).
     UnknownSnapshot,
+    /// A submitted scene that cannot be used; the message names line, key and what to do.
+    BadScene,
+    /// A job that does not exist.
+    UnknownJob,
+    /// A client id that belongs to a job with another request.
+    JobConflict,
+    /// The job's state does not allow it: cancelling what is over, resuming what runs, fetching what is not done.
+    JobState,
+    /// Too many jobs are not over yet.
+    TooManyJobs,
+    /// The daemon takes no jobs: its data folder cannot be used.
+    JobsUnavailable,
     /// `?offset=` is no number or beyond the end.
     BadOffset,
     /// Nothing to answer with yet, for instance no frame.
@@ -213,7 +261,7 @@ pub enum ErrorCode {
 
 impl ErrorCode {
     /// All codes.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 20] = [
         Self::RpcUnknown,
         Self::RpcWildcard,
         Self::RpcMalformed,
@@ -222,6 +270,12 @@ impl ErrorCode {
         Self::UnknownTool,
         Self::UnknownObject,
         Self::UnknownSnapshot,
+        Self::BadScene,
+        Self::UnknownJob,
+        Self::JobConflict,
+        Self::JobState,
+        Self::TooManyJobs,
+        Self::JobsUnavailable,
         Self::BadOffset,
         Self::NotReady,
         Self::Busy,
@@ -241,6 +295,12 @@ impl ErrorCode {
             Self::UnknownTool => "unknown_tool",
             Self::UnknownObject => "unknown_object",
             Self::UnknownSnapshot => "unknown_snapshot",
+            Self::BadScene => "bad_scene",
+            Self::UnknownJob => "unknown_job",
+            Self::JobConflict => "job_conflict",
+            Self::JobState => "job_state",
+            Self::TooManyJobs => "too_many_jobs",
+            Self::JobsUnavailable => "jobs_unavailable",
             Self::BadOffset => "bad_offset",
             Self::NotReady => "not_ready",
             Self::Busy => "busy",
@@ -252,6 +312,6 @@ impl ErrorCode {
 
     /// True if the same request may succeed later.
     pub fn retryable(self) -> bool {
-        matches!(self, Self::NotReady | Self::Busy | Self::TimedOut)
+        matches!(self, Self::NotReady | Self::Busy | Self::TimedOut | Self::TooManyJobs)
     }
 }

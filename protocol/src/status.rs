@@ -7,6 +7,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::jobs::JobStatus;
+
 /// Counters by kind of event.
 pub type Counters = BTreeMap<String, u64>;
 
@@ -55,8 +57,10 @@ pub struct Status {
     pub rejected: Counters,
     /// Messages that were made but not sent.
     pub drops: Drops,
-    /// Jobs; empty until the daemon has any.
-    pub jobs: Vec<serde_json::Value>,
+    /// The newest [`crate::jobs::MAX_IN_STATUS`] jobs, oldest first.
+    pub jobs: Vec<JobStatus>,
+    /// Why the daemon takes no jobs; null if it does.
+    pub jobs_unavailable: Option<String>,
 }
 
 /// What the operating system granted to the simulation thread.

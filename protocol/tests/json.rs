@@ -78,7 +78,7 @@ fn methods_and_codes() {
     let error = Method::parse("rest").unwrap_err();
     assert_eq!(
         error.to_json(),
-        r#"{"code":"rpc_unknown","message":"no method `rest`; there are reset, pause, resume, step, snapshot, restore","retryable":false}"#
+        r#"{"code":"rpc_unknown","message":"no method `rest`; there are reset, pause, resume, step, snapshot, restore, job_submit, job_list, job_get, job_cancel, job_resume, job_fetch","retryable":false}"#
     );
     assert!(ErrorReply::new(ErrorCode::Busy, "").retryable);
 }
@@ -114,7 +114,13 @@ fn status_reads_older_and_newer_daemons() {
     assert_eq!(status.tick, 7);
     let json = serde_json::to_string(&Status::default()).unwrap();
     assert_eq!(serde_json::from_str::<Status>(&json).unwrap(), Status::default());
-    for key in ["\"scheduling\":\"normal\"", "\"tick_us\":{\"count\":0", "\"jobs\":[]", "\"drops\":{\"wrenches\":0"] {
+    for key in [
+        "\"scheduling\":\"normal\"",
+        "\"jobs_unavailable\":null",
+        "\"tick_us\":{\"count\":0",
+        "\"jobs\":[]",
+        "\"drops\":{\"wrenches\":0",
+    ] {
         assert!(json.contains(key), "{key} in {json}");
     }
 }

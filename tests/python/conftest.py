@@ -38,15 +38,16 @@ def scene(tmp_path_factory):
 
 
 class Daemon:
-    """A running plicad."""
+    """A running plicad, with a data folder beside its log unless it gets another one."""
 
-    def __init__(self, plicad, scene, log):
+    def __init__(self, plicad, scene, log, data=None, options=()):
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             self.endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
         self.log = log
+        self.data = data or log.with_suffix(".data")
         with open(log, "w") as out:
-            command = [plicad, "serve", scene, "--listen", self.endpoint]
+            command = [plicad, "serve", scene, "--listen", self.endpoint, "--data", str(self.data), *options]
             self.process = subprocess.Popen(command, stdout=out, stderr=subprocess.STDOUT)
 
     def wait(self):

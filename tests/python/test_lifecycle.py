@@ -25,8 +25,8 @@ def test_the_liveliness_token_is_there(client):
     assert any(reply.ok for reply in client.session.liveliness().get(f"{client.root}/alive", timeout=5.0))
 
 
-def test_a_taken_port_is_named(daemon, plicad, scene):
-    command = [plicad, "serve", scene, "--listen", daemon.endpoint]
+def test_a_taken_port_is_named(daemon, plicad, scene, tmp_path):
+    command = [plicad, "serve", scene, "--listen", daemon.endpoint, "--data", str(tmp_path / "other")]
     second = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert second.returncode != 0
     port = daemon.endpoint.rsplit(":", 1)[1]

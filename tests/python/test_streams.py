@@ -116,7 +116,8 @@ def test_status_is_published_and_names_everything(client):
     status = heard.messages()[-1]
     heard.close()
     expected = {"versions", "session", "scene", "uptime_s", "tick", "sim_time_s", "paused", "realtime", "tick_us",
-                "stages", "lateness_us", "overruns", "skipped_ticks", "objects", "tools", "rejected", "drops", "jobs"}
+                "stages", "lateness_us", "overruns", "skipped_ticks", "objects", "tools", "rejected", "drops", "jobs",
+                "jobs_unavailable"}
     assert expected <= set(status), expected - set(status)
     assert list(status["tools"]) == ["probe"] and list(status["objects"]) == ["wedge"]
     assert {"count", "min", "p50", "p90", "p99", "p999", "max"} <= set(status["tick_us"])

@@ -1,11 +1,13 @@
 //! The command line.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use plica_protocol::{DEFAULT_ENDPOINT, DEFAULT_SESSION};
 
 use crate::bus::BusOptions;
+use crate::jobs::Priority;
 
 /// Simulates a soft object that tools touch, at 1 kHz, and serves it on a Zenoh bus.
 #[derive(Debug, Parser)]
@@ -37,6 +39,9 @@ pub enum Command {
     Check(CheckArgs),
     /// Prints the JSON Schema of scene files.
     Schema,
+    /// Becomes the process of a job.
+    #[command(hide = true)]
+    Child(ChildArgs),
 }
 
 /// Where the daemon is found.
@@ -75,6 +80,32 @@ pub struct ServeArgs {
     /// Ticks only when rpc/step says so.
     #[arg(long)]
     pub lock_step: bool,
+    /// Folder for jobs and their results; one daemon at a time uses it.
+    #[arg(long, value_name = "DIR", help = DATA_HELP)]
+    pub data: Option<PathBuf>,
+    /// How much of the machine jobs may take from others.
+    #[arg(long, value_enum, default_value_t, value_name = "CLASS")]
+    pub job_priority: Priority,
+}
+
+const DATA_HELP: &str =
+    "Folder for jobs and their results; one daemon at a time uses it [default: ~/.local/share/plica/SESSION]";
+
+/// `plicad child`.
+#[derive(Debug, Args)]
+pub struct ChildArgs {
+    /// Process that starts it; without that one it ends.
+    #[arg(long)]
+    pub parent: u32,
+    /// How low it runs.
+    #[arg(long, value_enum)]
+    pub priority: Priority,
+    /// Core that it keeps off.
+    #[arg(long)]
+    pub avoid_cpu: Option<usize>,
+    /// What it becomes.
+    #[arg(last = true, required = true)]
+    pub command: Vec<OsString>,
 }
 
 /// `plicad simulate`.

@@ -9,6 +9,7 @@ pub mod commands;
 pub mod config;
 pub mod demo;
 pub mod frames_file;
+pub mod jobs;
 pub mod limits;
 pub mod logging;
 pub mod motion;

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use plica_protocol::keys::Keys;
 use plica_sim::Model;
 
-use crate::bus::{Bus, BusError, BusOptions, Scene};
+use crate::bus::{Bus, BusError, BusOptions, Parts, Scene};
 use crate::config::Config;
+use crate::jobs::{DataFolderError, Jobs, Supervision};
 use crate::limits::{FrameTooLarge, check_frame};
 use crate::realtime::{Grants, Loop, LoopOptions, Running, ThreadOptions, spawn};
 use crate::scene::{self, SceneError};
@@ -26,6 +27,9 @@ pub enum ServerError {
     /// The simulation thread cannot be started.
     #[error("the simulation thread cannot be started: {0}")]
     Thread(#[from] std::io::Error),
+    /// Another daemon has the data folder.
+    #[error(transparent)]
+    Data(#[from] DataFolderError),
 }
 
 /// A running daemon.
@@ -33,13 +37,25 @@ pub struct Server {
     bus: Bus,
     simulation: Running,
     model: Arc<Model>,
+    supervision: Option<Supervision>,
 }
 
 impl Server {
-    /// Builds the scene, opens the bus and starts ticking (in lock-step: waits for `rpc/step`).
+    /// Builds the scene, opens the bus and starts ticking (in lock-step: waits for `rpc/step`). Without jobs.
     pub fn start(config: &Config, options: &BusOptions, lock_step: bool) -> Result<Self, ServerError> {
+        Self::start_with_jobs(config, options, lock_step, || Ok((Jobs::unavailable("it was started without"), None)))
+    }
+
+    /// The same with jobs, which are opened once the bus is: that another daemon has the port is told first.
+    pub fn start_with_jobs(
+        config: &Config,
+        options: &BusOptions,
+        lock_step: bool,
+        jobs: impl FnOnce() -> Result<(Jobs, Option<Supervision>), DataFolderError>,
+    ) -> Result<Self, ServerError> {
         let keys = Keys::new(&options.session).map_err(BusError::from)?;
         let session = Bus::open(options)?;
+        let (jobs, supervision) = jobs()?;
         let model = Arc::new(scene::build(config)?);
         check_frame(config, model.n_skin())?;
         let publish = config.object().publish();
@@ -47,8 +63,8 @@ impl Server {
         let (core, ports) = Loop::new(Arc::clone(&model), loop_options);
         let simulation = spawn(core, thread_options(config))?;
         let grants = simulation.grants().clone();
-        let bus = Bus::start(session, keys, describe(config), Arc::clone(&model), ports, grants)?;
-        Ok(Self { bus, simulation, model })
+        let parts = Parts { session, keys, scene: describe(config), model: Arc::clone(&model), ports, grants, jobs };
+        Ok(Self { bus: Bus::start(parts)?, simulation, model, supervision })
     }
 
     /// The scene's model.
@@ -66,10 +82,13 @@ impl Server {
         self.simulation.is_alive()
     }
 
-    /// Stops ticking and closes the bus, in three seconds at most.
+    /// Stops ticking, closes the bus and ends the running job, in five seconds at most; without a job in three.
     pub fn stop(self) {
-        self.simulation.stop();
-        self.bus.close();
+        let Self { bus, simulation, supervision, .. } = self;
+        supervision.iter().for_each(Supervision::begin_stop);
+        simulation.stop();
+        bus.close();
+        drop(supervision);
     }
 }
 

@@ -6,6 +6,7 @@
 mod counters;
 mod guard;
 mod intake;
+mod jobs;
 mod mesh;
 mod port_owner;
 mod pose_gate;
@@ -27,6 +28,7 @@ use plica_sim::Model;
 use zenoh::{Session, Wait};
 
 use crate::config::PublishConfig;
+use crate::jobs::Jobs;
 use crate::realtime::{Grants, Ports};
 
 use counters::SharedCounters;
@@ -88,6 +90,24 @@ pub struct Scene {
     pub publish: PublishConfig,
 }
 
+/// What a bus is made of.
+pub struct Parts {
+    /// From [`Bus::open`].
+    pub session: Session,
+    /// Keys of the session.
+    pub keys: Keys,
+    /// What there is to publish.
+    pub scene: Scene,
+    /// The scene's model.
+    pub model: Arc<Model>,
+    /// The simulation thread's other ends.
+    pub ports: Ports,
+    /// What the simulation thread was granted.
+    pub grants: Grants,
+    /// Jobs, or why there are none.
+    pub jobs: Jobs,
+}
+
 /// An open bus with all its publishers, subscribers and answering threads.
 pub struct Bus {
     session: Session,
@@ -113,6 +133,7 @@ struct Shared {
     model: Arc<Model>,
     intake: Arc<PoseIntake>,
     counters: Arc<SharedCounters>,
+    jobs: Jobs,
     stop: Arc<AtomicBool>,
     started: Instant,
 }
@@ -124,14 +145,8 @@ impl Bus {
     }
 
     /// Declares every key and starts the threads.
-    pub fn start(
-        session: Session,
-        keys: Keys,
-        scene: Scene,
-        model: Arc<Model>,
-        ports: Ports,
-        grants: Grants,
-    ) -> Result<Self, BusError> {
+    pub fn start(parts: Parts) -> Result<Self, BusError> {
+        let Parts { session, keys, scene, model, ports, grants, jobs } = parts;
         let Ports { poses, commands, frames, wrenches, readings, statistics } = ports;
         let counters = Arc::new(SharedCounters::default());
         let intake = Arc::new(PoseIntake::new(&scene, poses));
@@ -143,6 +158,7 @@ impl Bus {
             model,
             intake,
             counters,
+            jobs,
             stop: Arc::clone(&stop),
             started: Instant::now(),
         });
@@ -152,14 +168,15 @@ impl Bus {
         let wrench_thread = wrench::start(&shared, wrenches)?;
         let sources = status::Sources { readings, statistics, grants, published };
         let (status_queries, status_thread) = status::start(&shared, sources, replies.clone())?;
-        let (rpc_queries, rpc_thread) = rpc::start(&shared, commands, replies.clone())?;
+        let (job_requests, job_thread) = jobs::start(&shared, replies.clone())?;
+        let (rpc_queries, rpc_thread) = rpc::start(&shared, commands, replies.clone(), job_requests)?;
         let mesh_queries = mesh::declare(&shared, replies)?;
         let declared = Declared {
             _poses: poses::declare(&shared)?,
             _queryables: vec![skin_queries, status_queries, rpc_queries, mesh_queries],
             _alive: alive(&shared)?,
         };
-        let threads = vec![reply_thread, skin_thread, wrench_thread, status_thread, rpc_thread];
+        let threads = vec![reply_thread, skin_thread, wrench_thread, status_thread, rpc_thread, job_thread];
         let wake = threads.iter().map(|t| t.thread().clone()).collect();
         Ok(Self { session, stop, threads, wake, _declared: declared })
     }

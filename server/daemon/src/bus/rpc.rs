@@ -1,7 +1,7 @@
-//! Methods: one at a time, on a thread of their own.
+//! Methods of the simulation: one at a time, on a thread of their own. Those about jobs are handed to another thread.
 
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -29,11 +29,14 @@ pub(super) fn start(
     shared: &Arc<Shared>,
     port: CommandPort,
     replies: Replies,
+    job_requests: SyncSender<Query>,
 ) -> Result<(Queryable<()>, JoinHandle<()>), BusError> {
     let (requests_in, requests) = sync_channel(QUEUE);
-    let busy = replies.clone();
+    let (busy, keys) = (replies.clone(), shared.keys.clone());
     let callback = guarded(&shared.counters, move |query: Query| {
-        if let Err(TrySendError::Full(query) | TrySendError::Disconnected(query)) = requests_in.try_send(query) {
+        let about_jobs = keys.method_of_rpc(query.key_expr().as_str()).is_some_and(is_about_jobs);
+        let queue = if about_jobs { &job_requests } else { &requests_in };
+        if let Err(TrySendError::Full(query) | TrySendError::Disconnected(query)) = queue.try_send(query) {
             busy.send(query, Err(ErrorReply::new(ErrorCode::Busy, "too many requests are waiting")));
         }
     });
@@ -41,6 +44,10 @@ pub(super) fn start(
     let queryable = queryable.wait().map_err(|e| shared.error(e))?;
     let worker = Worker { shared: Arc::clone(shared), port, replies, requests, outstanding: 0 };
     Ok((queryable, spawn("plica-rpc", move || worker.run())?))
+}
+
+fn is_about_jobs(name: &str) -> bool {
+    Method::parse(name).is_ok_and(Method::is_about_jobs)
 }
 
 struct Worker {
@@ -80,18 +87,15 @@ impl Worker {
     }
 
     fn call(&mut self, method: Method, payload: &[u8]) -> Result<String, ErrorReply> {
+        let plain = |command| decode_request(payload).map(|EmptyRequest {}| command);
         let command = match method {
             Method::Step => self.step(decode_request(payload)?)?,
             Method::Restore => restore(&decode_request(payload)?)?,
-            _ => {
-                let EmptyRequest {} = decode_request(payload)?;
-                match method {
-                    Method::Reset => Command::Reset,
-                    Method::Pause => Command::Pause,
-                    Method::Resume => Command::Resume,
-                    _ => Command::Snapshot,
-                }
-            }
+            Method::Reset => plain(Command::Reset)?,
+            Method::Pause => plain(Command::Pause)?,
+            Method::Resume => plain(Command::Resume)?,
+            Method::Snapshot => plain(Command::Snapshot)?,
+            _ => return Err(ErrorReply::new(ErrorCode::Internal, "a request about jobs went astray")),
         };
         let outcome = self.order(command)?;
         match method {
@@ -151,6 +155,6 @@ fn restore(request: &RestoreRequest) -> Result<Command, ErrorReply> {
     request.id.parse().map(|id| Command::Restore { id }).map_err(unknown)
 }
 
-fn json(reply: &impl Serialize) -> Result<String, ErrorReply> {
+pub(super) fn json(reply: &impl Serialize) -> Result<String, ErrorReply> {
     serde_json::to_string(reply).map_err(|e| ErrorReply::new(ErrorCode::Internal, e.to_string()))
 }

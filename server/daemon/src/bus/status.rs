@@ -119,7 +119,8 @@ impl Worker {
             tools: tools(shared, reading),
             rejected: shared.counters.copy(),
             drops: Drops { wrenches: statistics.wrench_drops.load(Relaxed), frames: published.dropped.load(Relaxed) },
-            jobs: Vec::new(),
+            jobs: shared.jobs.status(),
+            jobs_unavailable: shared.jobs.why_unavailable().map(str::to_owned),
         }
     }
 }

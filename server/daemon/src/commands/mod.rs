@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod check;
+pub mod child;
 pub mod demo;
 pub mod schema;
 pub mod serve;
@@ -21,6 +22,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Bench(args) => bench::run(args, cli.json),
         Command::Check(args) => check::run(args, cli.json),
         Command::Schema => schema::run(cli.json),
+        Command::Child(args) => child::run(args),
     }
 }
 

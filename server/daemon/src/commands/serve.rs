@@ -1,5 +1,6 @@
 //! `plicad serve`.
 
+use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Context;
@@ -7,7 +8,8 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use crate::cli::ServeArgs;
-use crate::config::Config;
+use crate::config::{BUILT_IN_SCENE, Config, ConfigError};
+use crate::jobs::{DataFolder, DataFolderError, Jobs, Launch, ServedScene, Supervision, default_path};
 use crate::server::Server;
 
 const LOOK_AROUND: Duration = Duration::from_millis(100);
@@ -16,9 +18,9 @@ const LOOK_AROUND: Duration = Duration::from_millis(100);
 pub fn run(args: &ServeArgs, json: bool) -> anyhow::Result<()> {
     // Registered first, so that a signal during the start is not lost.
     let mut signals = Signals::new([SIGINT, SIGTERM]).context("cannot listen for signals")?;
-    let config = args.scene.as_deref().map_or_else(Config::built_in, Config::from_file)?;
+    let (config, text) = read(args)?;
     let options = args.bus.options();
-    let server = Server::start(&config, &options, args.lock_step)?;
+    let server = Server::start_with_jobs(&config, &options, args.lock_step, || open_jobs(args, &config, text))?;
     for warning in &server.grants().warnings {
         tracing::warn!("{warning}");
     }
@@ -32,6 +34,41 @@ pub fn run(args: &ServeArgs, json: bool) -> anyhow::Result<()> {
         println!("{}", serde_json::json!({ "scene": config.name(), "stopped": true }));
     }
     Ok(())
+}
+
+/// The scene and its text, which jobs take along.
+fn read(args: &ServeArgs) -> Result<(Config, String), ConfigError> {
+    let Some(file) = &args.scene else { return Ok((Config::built_in()?, BUILT_IN_SCENE.to_owned())) };
+    match std::fs::read_to_string(file) {
+        Ok(text) => Ok((Config::parse(file, &text)?, text)),
+        // It says what is wrong with the file.
+        Err(_) => Config::from_file(file).map(|config| (config, String::new())),
+    }
+}
+
+/// Jobs in the data folder. With a folder that cannot be used the daemon goes on without jobs, and says so here and in
+/// its status; one that another daemon has is an error.
+fn open_jobs(args: &ServeArgs, config: &Config, text: String) -> Result<(Jobs, Option<Supervision>), DataFolderError> {
+    let session = &args.bus.session;
+    let path = match args.data.clone().map_or_else(|| default_path(session), Ok) {
+        Ok(path) => path,
+        Err(problem) => return Ok(without_jobs(problem)),
+    };
+    let folder = match DataFolder::open(&path, session) {
+        Ok(folder) => folder,
+        Err(error @ DataFolderError::Locked { .. }) => return Err(error),
+        Err(error) => return Ok(without_jobs(error.to_string())),
+    };
+    let scene_folder = args.scene.as_ref().and_then(|file| file.parent()).map(Path::to_owned);
+    let served = ServedScene { name: config.name().to_owned(), folder: scene_folder, text };
+    let launch = Launch::own(args.job_priority, config.runtime().cpu());
+    let started = launch.and_then(|launch| Jobs::start(folder, served, launch));
+    Ok(started.map_or_else(|e| without_jobs(e.to_string()), |(jobs, supervision)| (jobs, Some(supervision))))
+}
+
+fn without_jobs(problem: String) -> (Jobs, Option<Supervision>) {
+    tracing::warn!("no jobs: {problem}");
+    (Jobs::unavailable(problem), None)
 }
 
 fn wait(server: &Server, signals: &mut Signals) -> anyhow::Result<()> {

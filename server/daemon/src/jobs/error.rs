@@ -1,0 +1,86 @@
+//! Why a request about jobs is refused.
+
+use plica_protocol::jobs::{JobFile, JobState};
+use plica_protocol::rpc::{ErrorCode, ErrorReply};
+
+/// Why a request about jobs is refused.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum JobError {
+    /// The daemon has no data folder.
+    #[error("this daemon takes no jobs: {0}")]
+    Unavailable(String),
+    /// A job cannot be kept on disk.
+    #[error("the job cannot be stored: {0}")]
+    Disk(String),
+    /// No such job.
+    #[error("no job `{0}`; `job_list` names them")]
+    Unknown(String),
+    /// Two different requests with one client id.
+    #[error("client_id `{client_id}` belongs to job {id}, which asks for another {what}; choose a new client_id")]
+    Conflict {
+        /// What both have.
+        client_id: String,
+        /// The job that is there.
+        id: String,
+        /// The first key that differs.
+        what: &'static str,
+    },
+    /// It is over.
+    #[error("job {id} is {} already", .state.name())]
+    Over {
+        /// The job.
+        id: String,
+        /// Where it stands.
+        state: JobState,
+    },
+    /// It need not be resumed.
+    #[error("job {id} is {}; only failed, cancelled and paused jobs can be resumed", .state.name())]
+    NotResumable {
+        /// The job.
+        id: String,
+        /// Where it stands.
+        state: JobState,
+    },
+    /// There is no result.
+    #[error("job {id} is {}; its {} can be fetched when it is done", .state.name(), name_of(*.file))]
+    NotDone {
+        /// The job.
+        id: String,
+        /// Where it stands.
+        state: JobState,
+        /// What was asked for.
+        file: JobFile,
+    },
+    /// Too many jobs are not over.
+    #[error("{0} jobs wait already; cancel some, or wait until some are over")]
+    TooMany(usize),
+    /// The scene cannot be used.
+    #[error("{0}")]
+    Scene(String),
+}
+
+fn name_of(file: JobFile) -> &'static str {
+    match file {
+        JobFile::Database => "database",
+        JobFile::Report => "report",
+    }
+}
+
+impl JobError {
+    fn code(&self) -> ErrorCode {
+        match self {
+            Self::Unavailable(_) | Self::Disk(_) => ErrorCode::JobsUnavailable,
+            Self::Unknown(_) => ErrorCode::UnknownJob,
+            Self::Conflict { .. } => ErrorCode::JobConflict,
+            Self::Over { .. } | Self::NotResumable { .. } | Self::NotDone { .. } => ErrorCode::JobState,
+            Self::TooMany(_) => ErrorCode::TooManyJobs,
+            Self::Scene(_) => ErrorCode::BadScene,
+        }
+    }
+}
+
+impl From<JobError> for ErrorReply {
+    fn from(error: JobError) -> Self {
+        Self::new(error.code(), error.to_string())
+    }
+}

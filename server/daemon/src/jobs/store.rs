@@ -1,0 +1,220 @@
+//! All jobs of a data folder: in memory for questions, on disk for the next daemon.
+//!
+//! Questions lock memory only, so that a disk that hangs holds up no status. Writers take the disk's lock first.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::path::PathBuf;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use plica_protocol::jobs::{Job, JobListReply, JobState, MAX_LISTED, Progress};
+
+use super::JobError;
+use super::folder::{JobFolder, Order, Report, Standing};
+
+/// One job.
+#[derive(Debug, Clone)]
+pub(super) struct Entry {
+    pub(super) folder: JobFolder,
+    pub(super) order: Order,
+    pub(super) standing: Standing,
+    pub(super) report: Report,
+}
+
+/// A job of an earlier daemon.
+#[derive(Debug)]
+pub(super) struct Found {
+    pub(super) entry: Entry,
+    /// Whether it stands elsewhere now than its `state.json` says.
+    pub(super) changed: bool,
+}
+
+/// An entry, and what has become of its changes.
+#[derive(Debug)]
+struct Row {
+    entry: Entry,
+    /// Version of the last change.
+    version: u64,
+    /// Version that `state.json` holds.
+    saved: u64,
+}
+
+#[derive(Debug, Default)]
+struct Table {
+    rows: BTreeMap<u32, Row>,
+    version: u64,
+    last_number: u32,
+}
+
+/// All jobs.
+#[derive(Debug)]
+pub(super) struct Store {
+    jobs: PathBuf,
+    table: Mutex<Table>,
+    disk: Mutex<()>,
+}
+
+impl Store {
+    /// `last_number`: the largest number that any folder has, a job or not.
+    pub(super) fn new(jobs: PathBuf, found: BTreeMap<u32, Found>, last_number: u32) -> Self {
+        let row = |(number, Found { entry, changed })| (number, Row { entry, version: 1, saved: (!changed).into() });
+        let table = Table { rows: found.into_iter().map(row).collect(), version: 1, last_number };
+        Self { jobs, table: Mutex::new(table), disk: Mutex::new(()) }
+    }
+
+    /// The folder of all jobs.
+    pub(super) fn jobs(&self) -> &PathBuf {
+        &self.jobs
+    }
+
+    /// A number that no job has had.
+    pub(super) fn next_number(&self) -> u32 {
+        let mut table = self.lock();
+        table.last_number += 1;
+        table.last_number
+    }
+
+    /// A job whose folder is complete.
+    pub(super) fn insert(&self, number: u32, entry: Entry) -> Job {
+        let mut table = self.lock();
+        table.version += 1;
+        let row = Row { entry, version: table.version, saved: table.version };
+        let job = row.entry.job();
+        table.rows.insert(number, row);
+        job
+    }
+
+    /// Number of a job.
+    pub(super) fn find(&self, id: &str) -> Result<u32, JobError> {
+        let number = id.parse().ok().filter(|n| self.lock().rows.get(n).is_some_and(|row| row.entry.order.id == id));
+        number.ok_or_else(|| JobError::Unknown(id.chars().take(64).collect()))
+    }
+
+    /// The job that a client has submitted.
+    pub(super) fn find_client_id(&self, client_id: &str) -> Option<Entry> {
+        self.lock().rows.values().find(|row| row.entry.order.client_id == client_id).map(|row| row.entry.clone())
+    }
+
+    /// One job.
+    pub(super) fn entry(&self, number: u32) -> Option<Entry> {
+        self.lock().rows.get(&number).map(|row| row.entry.clone())
+    }
+
+    /// Where a job stands.
+    pub(super) fn state(&self, number: u32) -> Option<JobState> {
+        self.lock().rows.get(&number).map(|row| row.entry.standing.state)
+    }
+
+    /// The next in the queue.
+    pub(super) fn next_queued(&self) -> Option<u32> {
+        let queued = |row: &Row| row.entry.standing.state == JobState::Queued;
+        self.lock().rows.iter().find(|(_, row)| queued(row)).map(|(number, _)| *number)
+    }
+
+    /// How many jobs are not over.
+    pub(super) fn n_unfinished(&self) -> usize {
+        self.lock().rows.values().filter(|row| !row.entry.standing.state.is_over()).count()
+    }
+
+    /// The newest `most` jobs, oldest first.
+    pub(super) fn newest(&self, most: usize) -> Vec<Job> {
+        let table = self.lock();
+        let older = table.rows.len().saturating_sub(most);
+        table.rows.values().skip(older).map(|row| row.entry.job()).collect()
+    }
+
+    /// Reply of `job_list`.
+    pub(super) fn list(&self) -> JobListReply {
+        let jobs = self.newest(MAX_LISTED);
+        let older = self.lock().rows.len().saturating_sub(jobs.len()) as u32;
+        JobListReply { jobs, older }
+    }
+
+    /// Jobs that have changed since a version, and the version now.
+    pub(super) fn changed_since(&self, version: u64) -> (u64, Vec<Job>) {
+        let table = self.lock();
+        let changed = table.rows.values().filter(|row| row.version > version);
+        (table.version, changed.map(|row| row.entry.job()).collect())
+    }
+
+    /// Changes where a job stands, in memory; `change` decides on the spot, and what it answers comes back.
+    pub(super) fn change<T>(&self, number: u32, change: impl FnOnce(&mut Standing) -> T) -> Option<T> {
+        let mut table = self.lock();
+        let version = table.version + 1;
+        let row = table.rows.get_mut(&number)?;
+        let before = row.entry.standing.clone();
+        let answer = change(&mut row.entry.standing);
+        if row.entry.standing != before {
+            row.version = version;
+            table.version = version;
+        }
+        Some(answer)
+    }
+
+    /// What a job's process says of itself.
+    pub(super) fn report(&self, number: u32, report: Report) {
+        let mut table = self.lock();
+        let version = table.version + 1;
+        let Some(row) = table.rows.get_mut(&number).filter(|row| row.entry.report != report) else { return };
+        // Nothing to save: the process has written it.
+        let was_saved = row.saved == row.version;
+        row.entry.report = report;
+        row.version = version;
+        row.saved = if was_saved { version } else { row.saved };
+        table.version = version;
+    }
+
+    /// Writes `state.json` of a job, if it does not hold the present state already.
+    pub(super) fn save(&self, number: u32) -> io::Result<()> {
+        let _disk = self.disk.lock().unwrap_or_else(PoisonError::into_inner);
+        let unsaved = |row: &&Row| row.saved != row.version;
+        let row = self.lock().rows.get(&number).filter(unsaved).map(|row| (row.entry.clone(), row.version));
+        let Some((entry, version)) = row else { return Ok(()) };
+        entry.folder.write_standing(&entry.standing)?;
+        if let Some(row) = self.lock().rows.get_mut(&number) {
+            row.saved = row.saved.max(version);
+        }
+        Ok(())
+    }
+
+    /// Tries again what could not be written before.
+    pub(super) fn save_all(&self) {
+        let unsaved: Vec<u32> =
+            self.lock().rows.iter().filter(|(_, row)| row.saved != row.version).map(|(n, _)| *n).collect();
+        for number in unsaved {
+            // What fails again is tried again.
+            let _ = self.save(number);
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Table> {
+        self.table.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Entry {
+    /// The job as clients see it.
+    pub(super) fn job(&self) -> Job {
+        let (order, standing, report) = (self.order.clone(), self.standing.clone(), self.report.clone());
+        Job {
+            id: order.id,
+            client_id: order.client_id,
+            kind: order.kind,
+            scene_name: order.scene_name,
+            examples: order.examples,
+            seed: order.seed,
+            threads: order.threads,
+            submitted_unix_s: order.submitted_unix_s,
+            state: standing.state,
+            reason: standing.reason,
+            started_unix_s: standing.started_unix_s,
+            finished_unix_s: standing.finished_unix_s,
+            progress: progress(report),
+        }
+    }
+}
+
+fn progress(report: Report) -> Progress {
+    let Report { stage, done, rejected, total, seconds_left } = report;
+    Progress { stage, done, rejected, total, seconds_left }
+}
