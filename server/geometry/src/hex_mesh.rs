@@ -136,6 +136,18 @@ impl HexMesh {
         self.hex_indices().map(|hex| isoparametric::volume(&self.corner_positions(hex))).sum()
     }
 
+    /// Lower and upper corner of the bounding box \[m\].
+    pub fn bounds(&self) -> [Point3<f64>; 2] {
+        let first = self.nodes[0];
+        let lower = self.nodes.iter().fold(first, |a, x| a.inf(x));
+        [lower, self.nodes.iter().fold(first, |a, x| a.sup(x))]
+    }
+
+    /// Area of a face \[m^2\]: the integral of `|dX/dxi x dX/deta|` by 2 x 2 Gauss points.
+    pub fn quad_area(&self, quad: &[NodeIdx; 4]) -> f64 {
+        isoparametric::quad_area(&quad.map(|node| self.nodes[node.index()]))
+    }
+
     /// Mean over the hexahedra of the longest edge \[m\]: the mesh's cell size.
     pub fn mean_longest_edge(&self) -> f64 {
         let sum: f64 = self.hex_indices().map(|hex| isoparametric::longest_edge(&self.corner_positions(hex))).sum();

@@ -13,6 +13,8 @@ mod index;
 pub mod isoparametric;
 mod locate;
 mod neighbourhood;
+pub mod predicate;
+pub mod select;
 pub mod shapes;
 mod skin;
 

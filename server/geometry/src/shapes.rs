@@ -4,8 +4,9 @@ mod skin_grid;
 
 use nalgebra::Point3;
 
-use crate::hex_mesh::HexMesh;
+use crate::hex_mesh::{HexMesh, MeshError};
 use crate::index::NodeIdx;
+use crate::isoparametric;
 pub use skin_grid::{block_skin, wedge_skin};
 
 /// Top spacing that gives the default wedge a skin of about 6.9 k vertices \[m\].
@@ -63,14 +64,60 @@ pub fn block(size_m: [f64; 3], divisions: [usize; 3]) -> HexMesh {
 /// If a size is not positive and finite or a division is 0.
 pub fn wedge(wedge: &Wedge, divisions: [usize; 3]) -> HexMesh {
     wedge.check();
-    assert!(divisions.iter().all(|&n| n > 0), "divisions must be at least 1, they are {divisions:?}");
     let share = |i: usize, axis: usize| i as f64 / divisions[axis] as f64;
-    let nodes = lattice(divisions.map(|n| n + 1)).map(|[i, j, k]| {
+    let nodes = lattice_nodes(divisions, |[i, j, k]| {
         let x = share(i, 0) * wedge.length_m;
         Point3::new(x, share(j, 1) * wedge.width_m, share(k, 2) * wedge.height_m(x))
     });
-    let hexes = lattice(divisions).map(|cell| hex_corners(cell, divisions));
-    HexMesh::new(nodes.collect(), hexes.collect()).expect("a wedge of positive sizes makes valid hexahedra")
+    lattice_mesh(nodes, divisions).expect("a wedge of positive sizes makes valid hexahedra")
+}
+
+/// Eight corners, and how their inside is divided.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hexahedron {
+    /// Corners \[m\] in `VTK_HEXAHEDRON` order.
+    pub corners: [Point3<f64>; 8],
+    /// Hexahedra along the edges 0-1, 1-2 and 0-4.
+    pub divisions: [usize; 3],
+    /// Length of the last hexahedron over that of the first along each of them; 1 divides evenly.
+    pub grading: [f64; 3],
+}
+
+/// A hexahedron divided into hexahedra: the trilinear image of a graded lattice, numbered like [`wedge`].
+///
+/// Along an edge of `n` hexahedra with grading `g` their lengths grow by `q = g^(1 / (n - 1))`, so that node `i` lies at the
+/// share `(q^i - 1) / (q^n - 1)`.
+///
+/// # Errors
+/// [`MeshError`]: corners that make inverted or flat hexahedra, or are not finite.
+///
+/// # Panics
+/// If a division is 0 or a grading is not positive and finite.
+pub fn hexahedron(shape: &Hexahedron) -> Result<HexMesh, MeshError> {
+    let Hexahedron { corners, divisions, grading } = shape;
+    assert!(grading.iter().all(|g| g.is_finite() && *g > 0.0), "gradings must be positive, they are {grading:?}");
+    let nodes = lattice_nodes(*divisions, |at| {
+        let xi = [0, 1, 2].map(|k| 2.0 * graded_share(at[k], divisions[k], grading[k]) - 1.0);
+        isoparametric::map(corners, xi)
+    });
+    lattice_mesh(nodes, *divisions)
+}
+
+fn graded_share(i: usize, n: usize, grading: f64) -> f64 {
+    if i == 0 || i == n || n == 1 || grading == 1.0 {
+        return i as f64 / n as f64;
+    }
+    let log_q = grading.ln() / (n - 1) as f64;
+    (i as f64 * log_q).exp_m1() / (n as f64 * log_q).exp_m1()
+}
+
+fn lattice_nodes(divisions: [usize; 3], node: impl Fn([usize; 3]) -> Point3<f64>) -> Vec<Point3<f64>> {
+    assert!(divisions.iter().all(|&n| n > 0), "divisions must be at least 1, they are {divisions:?}");
+    lattice(divisions.map(|n| n + 1)).map(node).collect()
+}
+
+fn lattice_mesh(nodes: Vec<Point3<f64>>, divisions: [usize; 3]) -> Result<HexMesh, MeshError> {
+    HexMesh::new(nodes, lattice(divisions).map(|cell| hex_corners(cell, divisions)).collect())
 }
 
 fn block_as_wedge([length_m, width_m, height_m]: [f64; 3]) -> Wedge {

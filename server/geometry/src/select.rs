@@ -1,0 +1,185 @@
+//! Parts of a mesh: nodes, boundary faces or hexahedra by box, face of the bounding box, group or condition.
+
+use nalgebra::Point3;
+
+use crate::hex_mesh::HexMesh;
+use crate::import::{Group, Groups};
+use crate::index::{HexIdx, NodeIdx};
+use crate::predicate::Predicate;
+
+/// A node belongs to a face of the bounding box within this share of the box's diagonal.
+const FACE_TOLERANCE: f64 = 1e-6;
+/// What lies outside a box by no more than this share of the mesh's diagonal lies inside: rounding.
+const BOX_TOLERANCE: f64 = 1e-9;
+
+/// Conditions that must all hold.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Selector {
+    /// A box by its lower and upper corner \[m\]: nodes in it; faces and hexahedra whose centre is in it.
+    pub within: Option<[Point3<f64>; 2]>,
+    /// A face of the mesh's bounding box, by axis and end: nodes on it; faces with all corners on it.
+    pub side: Option<Side>,
+    /// A named group: its nodes, quads or hexahedra; where a group has no quads, faces with all corners in it.
+    pub group: Option<String>,
+    /// A condition on nodes, or on the centres of faces and hexahedra.
+    pub condition: Option<Predicate>,
+}
+
+/// A face of a bounding box.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Side {
+    /// 0, 1, 2 for x, y, z.
+    pub axis: usize,
+    /// Whether it is the end of largest coordinate.
+    pub upper: bool,
+}
+
+/// Why a selector selects nothing.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SelectError {
+    /// No group of that name.
+    #[error("no group `{name}`; the mesh has {}", list(known))]
+    UnknownGroup {
+        /// The name.
+        name: String,
+        /// Names that there are.
+        known: Vec<String>,
+    },
+    /// The group has no hexahedra.
+    #[error("group `{name}` has no hexahedra: it is a group of {}", ["points", "curves", "faces"][usize::from(*dimension)])]
+    NoVolume {
+        /// The name.
+        name: String,
+        /// Dimension of the group, 0 to 2.
+        dimension: u8,
+    },
+    /// Nothing fulfils all conditions.
+    #[error("selects none of {n} {of}")]
+    Empty {
+        /// How many there are.
+        n: usize,
+        /// Of what.
+        of: &'static str,
+    },
+}
+
+fn list(known: &[String]) -> String {
+    if known.is_empty() { "none".to_owned() } else { format!("`{}`", known.join("`, `")) }
+}
+
+impl Selector {
+    /// Nodes, in increasing order; at least one.
+    ///
+    /// # Errors
+    /// [`SelectError`].
+    pub fn nodes(&self, mesh: &HexMesh, groups: &Groups) -> Result<Vec<NodeIdx>, SelectError> {
+        let frame = Frame::new(mesh);
+        let group = self.group(groups, Groups::nodes)?;
+        let in_group = |node: NodeIdx| group.is_none_or(|group| group.nodes.binary_search(&node).is_ok());
+        let nodes = (0..mesh.n_nodes()).map(NodeIdx::from_index).filter(|&node| {
+            let x = &mesh.nodes()[node.index()];
+            in_group(node) && self.side.is_none_or(|side| frame.is_on(side, x)) && self.holds_at(&frame, x)
+        });
+        not_empty(nodes.collect(), mesh.n_nodes(), "nodes")
+    }
+
+    /// Boundary faces, outward; at least one.
+    ///
+    /// # Errors
+    /// [`SelectError`].
+    pub fn faces(&self, mesh: &HexMesh, groups: &Groups) -> Result<Vec<[NodeIdx; 4]>, SelectError> {
+        let frame = Frame::new(mesh);
+        let group = self.group(groups, |groups, name| groups.surface(name).or_else(|| groups.nodes(name)))?;
+        let quads = mesh.boundary_quads();
+        let n = quads.len();
+        let selected = quads.into_iter().filter(|quad| {
+            let corners = quad.map(|node| mesh.nodes()[node.index()]);
+            let is_on_side = self.side.is_none_or(|side| corners.iter().all(|x| frame.is_on(side, x)));
+            is_on_side && group.is_none_or(|group| has_face(group, quad)) && self.holds_at(&frame, &mean(&corners))
+        });
+        not_empty(selected.collect(), n, "boundary faces")
+    }
+
+    /// Hexahedra, in increasing order; at least one. A side of the bounding box selects those with a face on it.
+    ///
+    /// # Errors
+    /// [`SelectError`].
+    pub fn hexes(&self, mesh: &HexMesh, groups: &Groups) -> Result<Vec<HexIdx>, SelectError> {
+        let frame = Frame::new(mesh);
+        let group = self.group(groups, |groups, name| groups.volume(name).or_else(|| groups.nodes(name)))?;
+        if let Some(Group { name, dimension: dimension @ 0..=2, .. }) = group {
+            return Err(SelectError::NoVolume { name: name.clone(), dimension: *dimension });
+        }
+        let hexes = mesh.hex_indices().filter(|&hex| {
+            let corners = mesh.corner_positions(hex);
+            let is_on_side = self.side.is_none_or(|side| corners.iter().filter(|x| frame.is_on(side, x)).count() >= 4);
+            let in_group = group.is_none_or(|group| group.hexes.binary_search(&hex).is_ok());
+            is_on_side && in_group && self.holds_at(&frame, &mean(&corners))
+        });
+        not_empty(hexes.collect(), mesh.n_hexes(), "hexahedra")
+    }
+
+    /// Box and condition at a point.
+    fn holds_at(&self, frame: &Frame, x: &Point3<f64>) -> bool {
+        self.within.as_ref().is_none_or(|corners| frame.is_within(corners, x))
+            && self.condition.as_ref().is_none_or(|condition| condition.holds(x))
+    }
+
+    fn group<'g>(
+        &self,
+        groups: &'g Groups,
+        find: impl Fn(&'g Groups, &str) -> Option<&'g Group>,
+    ) -> Result<Option<&'g Group>, SelectError> {
+        let Some(name) = &self.group else { return Ok(None) };
+        let unknown = || {
+            let mut known: Vec<_> = groups.iter().map(|group| group.name.clone()).collect();
+            known.dedup();
+            SelectError::UnknownGroup { name: name.clone(), known }
+        };
+        find(groups, name).ok_or_else(unknown).map(Some)
+    }
+}
+
+fn not_empty<T>(selected: Vec<T>, n: usize, of: &'static str) -> Result<Vec<T>, SelectError> {
+    if selected.is_empty() { Err(SelectError::Empty { n, of }) } else { Ok(selected) }
+}
+
+fn has_face(group: &Group, quad: &[NodeIdx; 4]) -> bool {
+    if group.faces.is_empty() {
+        return quad.iter().all(|node| group.nodes.binary_search(node).is_ok());
+    }
+    let mut sorted = *quad;
+    sorted.sort_unstable();
+    group.faces.binary_search(&sorted).is_ok()
+}
+
+fn mean(points: &[Point3<f64>]) -> Point3<f64> {
+    Point3::from(points.iter().map(|x| x.coords).sum::<nalgebra::Vector3<f64>>() / points.len() as f64)
+}
+
+/// The mesh's bounding box \[m\].
+struct Frame {
+    lower: Point3<f64>,
+    upper: Point3<f64>,
+}
+
+impl Frame {
+    fn new(mesh: &HexMesh) -> Self {
+        let [lower, upper] = mesh.bounds();
+        Self { lower, upper }
+    }
+
+    fn diagonal(&self) -> f64 {
+        (self.upper - self.lower).norm()
+    }
+
+    fn is_on(&self, side: Side, x: &Point3<f64>) -> bool {
+        let end = if side.upper { self.upper } else { self.lower };
+        (x[side.axis] - end[side.axis]).abs() <= FACE_TOLERANCE * self.diagonal()
+    }
+
+    fn is_within(&self, [lower, upper]: &[Point3<f64>; 2], x: &Point3<f64>) -> bool {
+        let slack = BOX_TOLERANCE * self.diagonal();
+        (0..3).all(|k| x[k] >= lower[k] - slack && x[k] <= upper[k] + slack)
+    }
+}
