@@ -31,10 +31,21 @@ pub trait Energy {
     /// Adds the second derivatives \[N/m\].
     fn add_hessian(&self, x: &[Vector3<f64>], projection: Projection, hessian: &mut Hessian);
 
-    /// Whether the gradient is the derivative of the value. Without one the value is 0, the Hessian is the symmetric part
-    /// of the gradient's derivative, and the solver judges steps by the residual.
+    /// Whether the gradient is the derivative of the value. A load without a potential has the value 0, and its Hessian is
+    /// a symmetric part of the gradient's derivative; [`Energy::add_remainder_product`] has the rest.
     fn has_potential(&self) -> bool {
         true
+    }
+
+    /// Adds `(D - H) v` \[N\] for `v: [n_nodes]` \[m\], of loads without a potential: `D` is the derivative of the gradient,
+    /// `H` what [`Energy::add_hessian`] adds under the same `projection`.
+    fn add_remainder_product(
+        &self,
+        _x: &[Vector3<f64>],
+        _v: &[Vector3<f64>],
+        _projection: Projection,
+        _product: &mut [Vector3<f64>],
+    ) {
     }
 
     /// Smallest `det F` over the integration points, for energies that have any.

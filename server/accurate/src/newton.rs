@@ -1,6 +1,9 @@
 //! Newton's method with a line search on a sum of energies.
 
 mod acceptance;
+mod direction;
+mod follower;
+mod line_search;
 mod report;
 
 use std::ops::ControlFlow;
@@ -8,20 +11,14 @@ use std::ops::ControlFlow;
 use nalgebra::Vector3;
 
 use crate::constraints::Constraints;
-use crate::energy::{Energy, Projection};
+use crate::energy::Energy;
 use crate::factor::{Factor, FactorError};
 use crate::hessian::Hessian;
-use acceptance::{Judgement, Start, Total};
+use acceptance::Total;
 pub use report::{Info, Params, Progress, SolveError};
 
-/// Share of the slope that may be left after a step that is judged by its slope \[HZ05\].
-const SLOPE_LEFT: f64 = 0.9;
-/// First shift of a matrix that stays indefinite, as a share of its mean diagonal; every further one is ten times larger.
-const FIRST_SHIFT: f64 = 1e-6;
 /// Forces below this share of stiffness times position are rounding.
-const FORCE_ROUNDING: f64 = 32.0 * f64::EPSILON;
-const MAX_SHIFTS: u32 = 10;
-const MAX_HALVINGS: u32 = 30;
+const FORCE_ROUNDING: f64 = 256.0 * f64::EPSILON;
 
 /// Minimises sums of energies that share one sparsity and one set of given coordinates.
 pub struct Solver {
@@ -162,130 +159,10 @@ impl Solver {
         let scale = largest_force.max(rounding / tolerance);
         Residual { relative: if largest == 0.0 { 0.0 } else { largest / scale }, norm }
     }
+}
 
-    /// `direction = -H^-1 (gradient + H_free,given motion)`.
-    fn find_direction(
-        &mut self,
-        energies: &[&dyn Energy],
-        constraints: &Constraints,
-        moves: bool,
-        x: &[Vector3<f64>],
-        info: &mut Info,
-    ) -> Result<(), SolveError> {
-        if !self.factorise(energies, Projection::Exact, moves, x) {
-            info.indefinite_steps += 1;
-            if !self.factorise(energies, Projection::PositiveSemidefinite, moves, x) && !self.factorise_shifted() {
-                return Err(SolveError::Singular { iterations: info.iterations });
-            }
-        }
-        for ((b, g), lift) in self.right_hand_side.iter_mut().zip(&self.gradient).zip(self.hessian.lift()) {
-            *b = lift - g;
-        }
-        clear_given(&mut self.right_hand_side, constraints);
-        self.factor.solve(&self.hessian, &self.right_hand_side, &mut self.direction);
-        for (direction, motion) in self.direction.iter_mut().zip(&self.motion) {
-            *direction += motion;
-        }
-        Ok(())
-    }
-
-    fn factorise(&mut self, energies: &[&dyn Energy], projection: Projection, moves: bool, x: &[Vector3<f64>]) -> bool {
-        self.hessian.clear(moves.then_some(&self.motion));
-        for energy in energies {
-            energy.add_hessian(x, projection, &mut self.hessian);
-        }
-        self.stiffness = self.hessian.mean_diagonal();
-        self.hessian.finish(self.stiffness);
-        self.factor.factorise(&self.hessian).is_ok()
-    }
-
-    fn factorise_shifted(&mut self) -> bool {
-        let mut shift = FIRST_SHIFT * self.stiffness;
-        for _ in 0..MAX_SHIFTS {
-            self.hessian.add_diagonal(shift);
-            if self.factor.factorise(&self.hessian).is_ok() {
-                return true;
-            }
-            shift *= 10.0;
-        }
-        false
-    }
-
-    /// Takes the longest step that keeps the energy finite and turns no element over.
-    fn follow_given(
-        &mut self,
-        energies: &[&dyn Energy],
-        constraints: &Constraints,
-        x: &mut [Vector3<f64>],
-        info: &mut Info,
-    ) -> bool {
-        let was_upright = energies.iter().all(|e| e.is_upright(x));
-        let mut length = 1.0;
-        for _ in 0..=MAX_HALVINGS {
-            self.try_step(x, length);
-            if length == 1.0 {
-                constraints.place(&mut self.trial);
-            }
-            let is_upright = !was_upright || energies.iter().all(|e| e.is_upright(&self.trial));
-            if is_upright && Total::of(energies, &self.trial).value.is_finite() {
-                x.copy_from_slice(&self.trial);
-                return true;
-            }
-            info.halvings += 1;
-            length *= 0.5;
-        }
-        false
-    }
-
-    /// Backtracks until the energy has fallen enough or, where its differences are rounding, the slope has.
-    fn search_line(
-        &mut self,
-        energies: &[&dyn Energy],
-        constraints: &Constraints,
-        residual: Residual,
-        x: &mut [Vector3<f64>],
-        info: &mut Info,
-    ) -> bool {
-        let start = Start {
-            total: Total::of(energies, x),
-            slope: self.gradient.iter().zip(&self.direction).map(|(g, p)| g.dot(p)).sum(),
-            norm: residual.norm,
-            has_potential: energies.iter().all(|e| e.has_potential()),
-        };
-        let mut length = 1.0;
-        for _ in 0..=MAX_HALVINGS {
-            self.try_step(x, length);
-            let accepted = match start.judge(&Total::of(energies, &self.trial), length) {
-                Judgement::Accept => true,
-                Judgement::Refuse => false,
-                Judgement::AskForces => self.is_better_by_forces(energies, constraints, &start),
-            };
-            if accepted {
-                x.copy_from_slice(&self.trial);
-                return true;
-            }
-            info.halvings += 1;
-            length *= 0.5;
-        }
-        false
-    }
-
-    /// Judges `trial` by its forces; leaves the gradient as it was.
-    fn is_better_by_forces(&mut self, energies: &[&dyn Energy], constraints: &Constraints, start: &Start) -> bool {
-        let gradient = self.gradient.clone();
-        let trial = std::mem::take(&mut self.trial);
-        let found = self.find_residual(energies, constraints, 1.0, &trial);
-        let slope_left: f64 = self.gradient.iter().zip(&self.direction).map(|(g, p)| g.dot(p)).sum();
-        self.trial = trial;
-        self.gradient = gradient;
-        if start.has_potential { slope_left.abs() <= SLOPE_LEFT * start.slope.abs() } else { found.norm < start.norm }
-    }
-
-    fn try_step(&mut self, x: &[Vector3<f64>], length: f64) {
-        for ((trial, x), p) in self.trial.iter_mut().zip(x).zip(&self.direction) {
-            *trial = x + p * length;
-        }
-    }
+fn dot(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }
 
 fn smallest_jacobian(energies: &[&dyn Energy], x: &[Vector3<f64>]) -> Option<f64> {

@@ -9,13 +9,16 @@ use crate::hessian::Hessian;
 
 /// A pressure `p` against faces of the deformed surface: `f_a = -int N_a p n da`, `n` outward.
 ///
-/// It has no potential unless the faces are closed; the Hessian is the symmetric part of the derivative, and indefinite
-/// by nature: a projected one leaves it out.
+/// It has no potential unless the faces are closed, and is treated as if it had none. The symmetric part of its derivative
+/// is the exact Hessian; being indefinite by nature, it is left out of a projected one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pressure {
     quads: Vec<[NodeIdx; 4]>,
     pressure_pa: f64,
 }
+
+/// `d gradient_a / dx_b` of a face.
+type Derivative = [[Matrix3<f64>; 4]; 4];
 
 impl Pressure {
     /// `pressure_pa` \[Pa\], positive when it pushes, on outward `quads` (as [`plica_geometry::HexMesh::boundary_quads`] has
@@ -27,6 +30,21 @@ impl Pressure {
     /// The same faces under another pressure \[Pa\].
     pub fn set_pressure(&mut self, pressure_pa: f64) {
         self.pressure_pa = pressure_pa;
+    }
+
+    /// `p int N_a (N_b,eta [s x .] - N_b,xi [t x .])`, with the tangents `s = dx/dxi`, `t = dx/deta`.
+    fn derivative(&self, corners: &[Vector3<f64>; 4]) -> Derivative {
+        let mut blocks = [[Matrix3::zeros(); 4]; 4];
+        for point in &QUAD_GAUSS_POINTS {
+            let [s, t] = tangents(corners, point);
+            for a in 0..4 {
+                for b in 0..4 {
+                    let turn = s * point.by_eta[b] - t * point.by_xi[b];
+                    blocks[a][b] += turn.cross_matrix() * (self.pressure_pa * point.shape[a]);
+                }
+            }
+        }
+        blocks
     }
 }
 
@@ -54,29 +72,33 @@ impl Energy for Pressure {
             return;
         }
         for quad in &self.quads {
-            let derivative = self.derivative(&corners(x, quad));
-            hessian.add_stencil(quad, |a, b| (derivative[a][b] + derivative[b][a].transpose()) * 0.5);
+            let d = self.derivative(&corners(x, quad));
+            hessian.add_stencil(quad, |a, b| (d[a][b] + d[b][a].transpose()) * 0.5);
         }
     }
 
     fn has_potential(&self) -> bool {
         false
     }
-}
 
-impl Pressure {
-    /// `d gradient_a / dx_b = p int N_a (N_b,xi [. x t] + N_b,eta [s x .])`, with the tangents `s = dx/dxi`, `t = dx/deta`.
-    fn derivative(&self, corners: &[Vector3<f64>; 4]) -> [[Matrix3<f64>; 4]; 4] {
-        let mut blocks = [[Matrix3::zeros(); 4]; 4];
-        for point in &QUAD_GAUSS_POINTS {
-            let [s, t] = tangents(corners, point);
+    fn add_remainder_product(
+        &self,
+        x: &[Vector3<f64>],
+        v: &[Vector3<f64>],
+        projection: Projection,
+        product: &mut [Vector3<f64>],
+    ) {
+        for quad in &self.quads {
+            let d = self.derivative(&corners(x, quad));
             for a in 0..4 {
                 for b in 0..4 {
-                    let turn = s * point.by_eta[b] - t * point.by_xi[b];
-                    blocks[a][b] += turn.cross_matrix() * (self.pressure_pa * point.shape[a]);
+                    let remainder = match projection {
+                        Projection::Exact => (d[a][b] - d[b][a].transpose()) * 0.5,
+                        Projection::PositiveSemidefinite => d[a][b],
+                    };
+                    product[quad[a].index()] += remainder * v[quad[b].index()];
                 }
             }
         }
-        blocks
     }
 }

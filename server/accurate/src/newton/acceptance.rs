@@ -32,6 +32,8 @@ pub(super) struct Start {
     pub(super) total: Total,
     /// Derivative of the energy along the step \[J\].
     pub(super) slope: f64,
+    /// Share of the slope that is of loads without a potential: in a line search they keep their forces.
+    pub(super) frozen_work: f64,
     /// Norm of the force at free coordinates \[N\].
     pub(super) norm: f64,
     pub(super) has_potential: bool,
@@ -42,20 +44,19 @@ pub(super) struct Start {
 pub(super) enum Judgement {
     Accept,
     Refuse,
-    /// Nothing: there is no potential, or the difference is rounding.
+    /// Nothing: the difference is rounding, or belongs to a load without a potential.
     AskForces,
 }
 
 impl Start {
     pub(super) fn judge(&self, trial: &Total, length: f64) -> Judgement {
         let rounding = ROUNDING * (self.total.magnitude + self.slope.abs());
+        let change = trial.value - self.total.value + length * self.frozen_work;
         if !trial.value.is_finite() {
             Judgement::Refuse
-        } else if !self.has_potential {
-            Judgement::AskForces
-        } else if trial.value <= self.total.value + SUFFICIENT_DECREASE * length * self.slope {
+        } else if change <= SUFFICIENT_DECREASE * length * self.slope {
             Judgement::Accept
-        } else if trial.value > self.total.value + rounding {
+        } else if self.has_potential && change > rounding {
             Judgement::Refuse
         } else {
             Judgement::AskForces

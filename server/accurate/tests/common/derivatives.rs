@@ -8,27 +8,29 @@ const TOLERANCE: f64 = 1e-7;
 
 /// Checks at `x`, moving nodes by up to 2e-4 of `length_m` \[m\]:
 ///
-/// * the gradient is the derivative of the value, for energies that have a potential;
-/// * the Hessian is the derivative of the gradient; without a potential, its symmetric part;
-/// * the projected Hessian is positive semi-definite and, with a potential, exceeds the exact one by something positive
-///   semi-definite.
+/// * the gradient is the derivative of the value, and the Hessian that of the gradient;
+/// * the projected Hessian is positive semi-definite, and exceeds the exact one by something positive semi-definite;
+/// * of loads without a potential: Hessian and remainder are together the derivative of the gradient.
 pub fn check_derivatives(name: &str, energy: &dyn Energy, x: &[Vector3<f64>], length_m: f64) {
     let step = 1e-4 * length_m;
     let gradient = gradient_of(energy, x);
     let exact = hessian_of(energy, x, Projection::Exact);
-    if energy.has_potential() {
-        let by_value = difference(x, step, |x| DVector::from_element(1, energy.value(x))).transpose();
-        let gradient = DMatrix::from_column_slice(gradient.len(), 1, gradient.as_slice());
-        assert_near(name, "gradient", &gradient, &by_value, exact.amax() * step);
-    }
     let by_gradient = difference(x, step, |x| gradient_of(energy, x));
-    let symmetric = (&by_gradient + by_gradient.transpose()) * 0.5;
-    assert_near(name, "Hessian", &exact, if energy.has_potential() { &by_gradient } else { &symmetric }, 0.0);
     let projected = hessian_of(energy, x, Projection::PositiveSemidefinite);
     assert_positive(name, "projected Hessian", &projected, exact.amax());
-    if energy.has_potential() {
-        assert_positive(name, "what projection adds", &(projected - &exact), exact.amax());
+    if !energy.has_potential() {
+        assert_eq!(energy.value(x), 0.0, "{name}");
+        for (hessian, projection) in [(exact, Projection::Exact), (projected, Projection::PositiveSemidefinite)] {
+            let derivative = hessian + remainder_of(energy, x, projection);
+            assert_near(name, "Hessian and remainder", &derivative, &by_gradient, 0.0);
+        }
+        return;
     }
+    let by_value = difference(x, step, |x| DVector::from_element(1, energy.value(x))).transpose();
+    let gradient = DMatrix::from_column_slice(gradient.len(), 1, gradient.as_slice());
+    assert_near(name, "gradient", &gradient, &by_value, exact.amax() * step);
+    assert_near(name, "Hessian", &exact, &by_gradient, 0.0);
+    assert_positive(name, "what projection adds", &(projected - &exact), exact.amax());
 }
 
 pub fn gradient_of(energy: &dyn Energy, x: &[Vector3<f64>]) -> DVector<f64> {
@@ -39,17 +41,29 @@ pub fn gradient_of(energy: &dyn Energy, x: &[Vector3<f64>]) -> DVector<f64> {
 
 /// All second derivatives, `[3 n_nodes, 3 n_nodes]`.
 pub fn hessian_of(energy: &dyn Energy, x: &[Vector3<f64>], projection: Projection) -> DMatrix<f64> {
-    let n = x.len();
-    let hessian = Hessian::assemble(&[energy], &Constraints::none(n), x, projection);
-    let mut dense = DMatrix::zeros(3 * n, 3 * n);
+    let hessian = Hessian::assemble(&[energy], &Constraints::none(x.len()), x, projection);
+    dense(x.len(), |v| hessian.multiply(v))
+}
+
+fn remainder_of(energy: &dyn Energy, x: &[Vector3<f64>], projection: Projection) -> DMatrix<f64> {
+    dense(x.len(), |v| {
+        let mut product = vec![Vector3::zeros(); v.len()];
+        energy.add_remainder_product(x, v, projection, &mut product);
+        product
+    })
+}
+
+/// The matrix that takes `v` to `multiply(v)`.
+fn dense(n: usize, multiply: impl Fn(&[Vector3<f64>]) -> Vec<Vector3<f64>>) -> DMatrix<f64> {
+    let mut matrix = DMatrix::zeros(3 * n, 3 * n);
     for column in 0..3 * n {
         let mut unit = vec![Vector3::zeros(); n];
         unit[column / 3][column % 3] = 1.0;
-        for (row, block) in hessian.multiply(&unit).iter().enumerate() {
-            dense.fixed_view_mut::<3, 1>(3 * row, column).copy_from(block);
+        for (row, block) in multiply(&unit).iter().enumerate() {
+            matrix.fixed_view_mut::<3, 1>(3 * row, column).copy_from(block);
         }
     }
-    dense
+    matrix
 }
 
 pub fn smallest_eigenvalue(matrix: &DMatrix<f64>) -> f64 {

@@ -1,0 +1,113 @@
+//! The Newton step: a matrix that is positive definite, and what it lacks.
+
+use nalgebra::Vector3;
+
+use super::{Info, SolveError, Solver, clear_given, dot, follower};
+use crate::constraints::Constraints;
+use crate::energy::{Energy, Projection};
+
+/// First shift of a matrix that stays indefinite, as a share of its mean diagonal; every further one is ten times larger.
+const FIRST_SHIFT: f64 = 1e-6;
+const MAX_SHIFTS: u32 = 10;
+
+impl Solver {
+    /// `direction = -H^-1 (gradient + H_free,given motion)`.
+    pub(super) fn find_direction(
+        &mut self,
+        energies: &[&dyn Energy],
+        constraints: &Constraints,
+        moves: bool,
+        x: &[Vector3<f64>],
+        info: &mut Info,
+    ) -> Result<(), SolveError> {
+        let loads = self.factorise_somehow(energies, moves, x, info)?;
+        for ((b, g), lift) in self.right_hand_side.iter_mut().zip(&self.gradient).zip(self.hessian.lift()) {
+            *b = lift - g;
+        }
+        clear_given(&mut self.right_hand_side, constraints);
+        self.factor.solve(&self.hessian, &self.right_hand_side, &mut self.direction);
+        if energies.iter().any(|e| !e.has_potential()) {
+            self.follow_loads(energies, constraints, loads, x);
+        }
+        for (direction, motion) in self.direction.iter_mut().zip(&self.motion) {
+            *direction += motion;
+        }
+        Ok(())
+    }
+
+    /// Tries the exact matrix; without the loads that have no potential, which alone may make it indefinite; the projected
+    /// one; shifts of it. The projection with which those loads are in the matrix.
+    fn factorise_somehow(
+        &mut self,
+        energies: &[&dyn Energy],
+        moves: bool,
+        x: &[Vector3<f64>],
+        info: &mut Info,
+    ) -> Result<Projection, SolveError> {
+        use Projection::{Exact, PositiveSemidefinite};
+        if self.factorise(energies, [Exact, Exact], moves, x) {
+            return Ok(Exact);
+        }
+        info.indefinite_steps += 1;
+        let has_loads = energies.iter().any(|e| !e.has_potential());
+        if has_loads && self.factorise(energies, [Exact, PositiveSemidefinite], moves, x)
+            || self.factorise(energies, [PositiveSemidefinite; 2], moves, x)
+            || self.factorise_shifted()
+        {
+            return Ok(PositiveSemidefinite);
+        }
+        Err(SolveError::Singular { iterations: info.iterations })
+    }
+
+    /// Projections are for energies with a potential and without.
+    fn factorise(
+        &mut self,
+        energies: &[&dyn Energy],
+        projections: [Projection; 2],
+        moves: bool,
+        x: &[Vector3<f64>],
+    ) -> bool {
+        self.hessian.clear(moves.then_some(&self.motion));
+        for energy in energies {
+            let projection = projections[usize::from(!energy.has_potential())];
+            energy.add_hessian(x, projection, &mut self.hessian);
+        }
+        self.stiffness = self.hessian.mean_diagonal();
+        self.hessian.finish(self.stiffness);
+        self.factor.factorise(&self.hessian).is_ok()
+    }
+
+    /// Turns `H^-1 b` into `(H + R)^-1 b`, `R` being what the matrix lacks of loads without a potential; not where that would
+    /// point uphill.
+    fn follow_loads(
+        &mut self,
+        energies: &[&dyn Energy],
+        constraints: &Constraints,
+        loads: Projection,
+        x: &[Vector3<f64>],
+    ) {
+        let (hessian, factor, product) = (&self.hessian, &mut self.factor, &mut self.single);
+        let mut direction = self.direction.clone();
+        follower::solve(&mut direction, |v, out| {
+            product.fill(Vector3::zeros());
+            energies.iter().for_each(|e| e.add_remainder_product(x, v, loads, product));
+            clear_given(product, constraints);
+            factor.solve(hessian, product, out);
+        });
+        if dot(&direction, &self.right_hand_side) > 0.0 {
+            self.direction = direction;
+        }
+    }
+
+    fn factorise_shifted(&mut self) -> bool {
+        let mut shift = FIRST_SHIFT * self.stiffness;
+        for _ in 0..MAX_SHIFTS {
+            self.hessian.add_diagonal(shift);
+            if self.factor.factorise(&self.hessian).is_ok() {
+                return true;
+            }
+            shift *= 10.0;
+        }
+        false
+    }
+}

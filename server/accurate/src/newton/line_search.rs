@@ -1,0 +1,98 @@
+//! How far to go along a Newton step.
+
+use nalgebra::Vector3;
+
+use super::acceptance::{Judgement, Start, Total};
+use super::{Info, Residual, Solver, dot};
+use crate::constraints::Constraints;
+use crate::energy::Energy;
+
+/// Share of the slope that may be left after a step that is judged by its slope \[HZ05\].
+const SLOPE_LEFT: f64 = 0.9;
+const MAX_HALVINGS: u32 = 30;
+
+impl Solver {
+    /// Takes the longest step that keeps the energy finite and turns no element over.
+    pub(super) fn follow_given(
+        &mut self,
+        energies: &[&dyn Energy],
+        constraints: &Constraints,
+        x: &mut [Vector3<f64>],
+        info: &mut Info,
+    ) -> bool {
+        let was_upright = energies.iter().all(|e| e.is_upright(x));
+        let mut length = 1.0;
+        for _ in 0..=MAX_HALVINGS {
+            self.try_step(x, length);
+            if length == 1.0 {
+                constraints.place(&mut self.trial);
+            }
+            let is_upright = !was_upright || energies.iter().all(|e| e.is_upright(&self.trial));
+            if is_upright && Total::of(energies, &self.trial).value.is_finite() {
+                x.copy_from_slice(&self.trial);
+                return true;
+            }
+            info.halvings += 1;
+            length *= 0.5;
+        }
+        false
+    }
+
+    /// Backtracks until the energy has fallen enough or, where its differences are rounding, the slope has.
+    pub(super) fn search_line(
+        &mut self,
+        energies: &[&dyn Energy],
+        constraints: &Constraints,
+        residual: Residual,
+        x: &mut [Vector3<f64>],
+        info: &mut Info,
+    ) -> bool {
+        let start = Start {
+            total: Total::of(energies, x),
+            slope: dot(&self.gradient, &self.direction),
+            frozen_work: self.frozen_work(energies, x),
+            norm: residual.norm,
+            has_potential: energies.iter().all(|e| e.has_potential()),
+        };
+        let mut length = 1.0;
+        for _ in 0..=MAX_HALVINGS {
+            self.try_step(x, length);
+            let accepted = match start.judge(&Total::of(energies, &self.trial), length) {
+                Judgement::Accept => true,
+                Judgement::Refuse => false,
+                Judgement::AskForces => self.is_better_by_forces(energies, constraints, &start),
+            };
+            if accepted {
+                x.copy_from_slice(&self.trial);
+                return true;
+            }
+            info.halvings += 1;
+            length *= 0.5;
+        }
+        false
+    }
+
+    /// Work against the loads that have no potential, held as they are, along the whole step \[J\].
+    fn frozen_work(&mut self, energies: &[&dyn Energy], x: &[Vector3<f64>]) -> f64 {
+        self.single.fill(Vector3::zeros());
+        energies.iter().filter(|e| !e.has_potential()).for_each(|e| e.add_gradient(x, &mut self.single));
+        dot(&self.single, &self.direction)
+    }
+
+    /// Judges `trial` by its forces; leaves the gradient as it was.
+    fn is_better_by_forces(&mut self, energies: &[&dyn Energy], constraints: &Constraints, start: &Start) -> bool {
+        let gradient = self.gradient.clone();
+        let trial = std::mem::take(&mut self.trial);
+        let found = self.find_residual(energies, constraints, 1.0, &trial);
+        let slope_left = dot(&self.gradient, &self.direction);
+        self.trial = trial;
+        self.gradient = gradient;
+        if start.has_potential { slope_left.abs() <= SLOPE_LEFT * start.slope.abs() } else { found.norm < start.norm }
+    }
+
+    fn try_step(&mut self, x: &[Vector3<f64>], length: f64) {
+        for ((trial, x), p) in self.trial.iter_mut().zip(x).zip(&self.direction) {
+            *trial = x + p * length;
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! What a solve reports, how it is cancelled and how it fails.
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+
+mod common;
+
+use std::ops::ControlFlow;
+
+use common::{affine, distance, material, rest, sides, solve};
+use nalgebra::{Rotation3, Unit, Vector3};
+use plica_accurate::{
+    Constraints, Energy, Info, MaterialModel, NodalForces, Params, Pressure, Solid, SolveError, Solver, Traction,
+    reactions,
+};
+use plica_geometry::shapes::block;
+use plica_geometry::{HexMesh, NodeIdx};
+
+const SIZE: [f64; 3] = [0.08, 0.02, 0.02];
+
+/// A beam, its mesh and what holds it at x = 0.
+struct Beam {
+    mesh: HexMesh,
+    solid: Solid,
+    constraints: Constraints,
+}
+
+impl Beam {
+    fn new() -> Self {
+        let mesh = block(SIZE, [8, 2, 2]);
+        let solid = Solid::uniform(&mesh, material(MaterialModel::StableNeoHookean, 3e4, 0.45)).unwrap();
+        let mut constraints = Constraints::none(mesh.n_nodes());
+        for (node, x) in mesh.nodes().iter().enumerate().filter(|(_, x)| sides(x, SIZE)[0][0]) {
+            constraints.hold(node, &x.coords);
+        }
+        Self { mesh, solid, constraints }
+    }
+
+    /// Faces of the end at x = length.
+    fn end(&self) -> Vec<[NodeIdx; 4]> {
+        let is_at_end = |node: &NodeIdx| sides(&self.mesh.nodes()[node.index()], SIZE)[0][1];
+        self.mesh.boundary_quads().into_iter().filter(|quad| quad.iter().all(is_at_end)).collect()
+    }
+
+    /// A dead traction on the end, sideways or along the beam \[Pa\].
+    fn load(&self, x: f64, z: f64) -> Traction {
+        Traction::new(&self.mesh, &self.end(), Vector3::new(x, 0.0, z))
+    }
+
+    fn solve(&self, load: &dyn Energy, params: &Params) -> (Result<Info, SolveError>, Vec<Vector3<f64>>) {
+        let mut x = rest(&self.mesh);
+        let result = solve(&[&self.solid, load], &self.constraints, params, &mut x);
+        (result, x)
+    }
+}
+
+#[test]
+fn history_is_that_of_newton() {
+    let beam = Beam::new();
+    let (result, x) = beam.solve(&beam.load(0.0, -150.0), &Params::default());
+    let info = result.unwrap();
+    println!("bent beam: {:?}", info.residuals);
+    assert_eq!(info.residuals.len() as u32, info.iterations + 1);
+    assert!(*info.residuals.last().unwrap() <= 1e-9 && info.residuals[0] > 0.1);
+    assert!((3..=15).contains(&info.iterations), "{info:?}");
+    // The last steps converge quadratically: each residual is about the square of the one before.
+    let [.., before, last] = info.residuals[..] else { panic!("{info:?}") };
+    assert!(last <= 1e2 * before * before || last <= 1e-12, "{info:?}");
+    assert_eq!(info.smallest_jacobian, beam.solid.smallest_jacobian(&x));
+    assert!((0.5..1.0).contains(&info.smallest_jacobian.unwrap()));
+}
+
+/// Pushed along its axis a slender beam buckles: on the way the exact matrix is not positive definite.
+#[test]
+fn indefinite_steps_are_counted() {
+    let beam = Beam::new();
+    let (stretched, _) = beam.solve(&beam.load(300.0, 0.0), &Params::default());
+    assert_eq!(stretched.unwrap().indefinite_steps, 0);
+    let (pushed, x) = beam.solve(&beam.load(-4e3, 1.0), &Params::default());
+    let info = pushed.unwrap();
+    println!(
+        "buckled beam: {} steps, {} indefinite, {} halvings",
+        info.iterations, info.indefinite_steps, info.halvings
+    );
+    assert!(info.indefinite_steps > 0, "{info:?}");
+    let sideways = x.iter().zip(beam.mesh.nodes()).map(|(x, rest)| (x.z - rest.z).abs()).fold(0.0, f64::max);
+    assert!(sideways > 0.25 * SIZE[0], "it bends out by {sideways} m");
+}
+
+#[test]
+fn reactions_balance_the_load() {
+    let beam = Beam::new();
+    let load = beam.load(100.0, -150.0);
+    let (result, x) = beam.solve(&load, &Params::default());
+    result.unwrap();
+    let energies: [&dyn Energy; 2] = [&beam.solid, &load];
+    let total: Vector3<f64> = reactions(&energies, &x).iter().sum();
+    assert!((total + load.total()).norm() <= 1e-8 * load.total().norm(), "{total}");
+    let free = reactions(&energies, &x).into_iter().zip(beam.mesh.nodes()).filter(|(_, x)| x.x > 0.0);
+    assert!(free.map(|(f, _)| f.norm()).fold(0.0, f64::max) <= 1e-8 * load.total().norm());
+}
+
+#[test]
+fn nodal_forces_are_a_traction_put_together_by_hand() {
+    let beam = Beam::new();
+    let load = beam.load(0.0, -150.0);
+    let quarter = Vector3::new(0.0, 0.0, -150.0) * SIZE[1] * SIZE[2] / 16.0;
+    let forces = beam.end().iter().flatten().map(|&node| (node, quarter)).collect();
+    let (_, by_traction) = beam.solve(&load, &Params::default());
+    let (_, by_forces) = beam.solve(&NodalForces::new(forces), &Params::default());
+    assert!(distance(&by_traction, &by_forces) <= 1e-9 * SIZE[0]);
+}
+
+/// A pull on the end that turns with it: at 3 kPa eight times the force that buckles the beam.
+#[test]
+fn follower_pressure_converges_on_a_bent_beam() {
+    let beam = Beam::new();
+    let sideways = beam.load(0.0, -150.0);
+    for (pull_pa, most_steps) in [(300.0, 15), (3e3, 100)] {
+        let pull = Pressure::new(beam.end(), -pull_pa);
+        let energies: [&dyn Energy; 3] = [&beam.solid, &sideways, &pull];
+        let mut x = rest(&beam.mesh);
+        let info = solve(&energies, &beam.constraints, &Params::default(), &mut x).unwrap();
+        println!("pulled by {pull_pa} Pa: {} steps, {} halvings", info.iterations, info.halvings);
+        assert!(info.iterations <= most_steps);
+        let free = reactions(&energies, &x).into_iter().zip(beam.mesh.nodes()).filter(|(_, x)| x.x > 0.0);
+        assert!(free.map(|(f, _)| f.norm()).fold(0.0, f64::max) <= 1e-9 * pull_pa * SIZE[1] * SIZE[2]);
+    }
+}
+
+#[test]
+fn the_observer_sees_every_step_and_may_cancel() {
+    let beam = Beam::new();
+    let load = beam.load(0.0, -150.0);
+    let energies: [&dyn Energy; 2] = [&beam.solid, &load];
+    let mut solver = Solver::new(&beam.constraints, &energies).unwrap();
+    let mut seen = Vec::new();
+    let mut x = rest(&beam.mesh);
+    let info = solver
+        .minimise(&energies, &beam.constraints, &Params::default(), &mut x, &mut |progress| {
+            seen.push(progress);
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+    assert_eq!(seen.iter().map(|p| p.residual).collect::<Vec<_>>(), info.residuals);
+    assert_eq!(seen.iter().map(|p| p.iteration).collect::<Vec<_>>(), (0..=info.iterations).collect::<Vec<_>>());
+
+    let mut x = rest(&beam.mesh);
+    let cancelled = solver.minimise(&energies, &beam.constraints, &Params::default(), &mut x, &mut |progress| {
+        if progress.iteration == 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert_eq!(cancelled, Err(SolveError::Cancelled { iterations: 2 }));
+    assert!(distance(&x, &rest(&beam.mesh)) > 0.0, "x is where the solve was");
+}
+
+#[test]
+fn too_few_steps_are_an_error_with_numbers() {
+    let beam = Beam::new();
+    let params = Params { max_iterations: 2, ..Params::default() };
+    match beam.solve(&beam.load(0.0, -150.0), &params).0 {
+        Err(SolveError::NotConverged { iterations: 2, residual, tolerance: 1e-9 }) => assert!(residual > 1e-9),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_body_that_nothing_holds_is_an_error() {
+    let beam = Beam::new();
+    let load = beam.load(10.0, 0.0);
+    let mut x = rest(&beam.mesh);
+    let params = Params { max_iterations: 20, ..Params::default() };
+    let result = solve(&[&beam.solid, &load], &Constraints::none(x.len()), &params, &mut x);
+    assert!(result.is_err(), "{result:?}");
+}
+
+/// Supports that move as a rigid body take the solid along without force, although all that is left is rounding.
+#[test]
+fn rigid_motion_of_the_supports_is_no_load() {
+    let beam = Beam::new();
+    let axis = Unit::new_normalize(Vector3::new(1.0, 1.0, 3.0));
+    let expected = affine(&beam.mesh, Rotation3::from_axis_angle(&axis, 0.7).matrix(), &Vector3::new(0.3, 0.1, -0.2));
+    let mut constraints = Constraints::none(beam.mesh.n_nodes());
+    for (node, _) in beam.mesh.nodes().iter().enumerate().filter(|(_, x)| sides(x, SIZE)[0][0]) {
+        constraints.hold(node, &expected[node]);
+    }
+    let mut x = rest(&beam.mesh);
+    let info = solve(&[&beam.solid], &constraints, &Params::default(), &mut x).unwrap();
+    println!("rigid motion: {:?}", info.residuals);
+    assert!(distance(&x, &expected) <= 1e-9, "{}", distance(&x, &expected));
+}
+
+#[test]
+fn a_solver_serves_one_load_after_another_with_the_same_bits() {
+    let beam = Beam::new();
+    let loads = [beam.load(0.0, -150.0), beam.load(-4e3, 1.0), beam.load(0.0, -150.0)];
+    let mut solver = Solver::new(&beam.constraints, &[&beam.solid]).unwrap();
+    let results = loads.each_ref().map(|load| {
+        let mut x = rest(&beam.mesh);
+        let energies: [&dyn Energy; 2] = [&beam.solid, load];
+        let go = &mut |_| ControlFlow::Continue(());
+        let info = solver.minimise(&energies, &beam.constraints, &Params::default(), &mut x, go).unwrap();
+        (x, info)
+    });
+    assert_eq!(results[0], results[2]);
+    assert_ne!(results[0].0, results[1].0);
+    assert_eq!(results[0].0, beam.solve(&loads[0], &Params::default()).1, "as by a fresh solver");
+}
