@@ -195,11 +195,11 @@ pub struct Job {
 pub struct Progress {
     /// What it does at the moment: `interactions`, `examples`, `database`, perhaps others later; null before the start.
     pub stage: Option<String>,
-    /// Examples that are finished and on disk, rejected ones included.
+    /// Examples that are on disk.
     pub done: u32,
-    /// Of those, how many were rejected.
+    /// Interactions that gave no example: they did not converge, or came out too distorted. The report lists them.
     pub rejected: u32,
-    /// Examples in all; 0 while it is not known.
+    /// Interactions in all, `done + rejected` at the end; 0 while it is not known.
     pub total: u32,
     /// Estimate of the time left in seconds.
     pub seconds_left: Option<f64>,
@@ -261,12 +261,15 @@ pub struct JobStatus {
     pub state: JobState,
     /// See [`Progress::done`].
     pub done: u32,
+    /// See [`Progress::rejected`].
+    pub rejected: u32,
     /// See [`Progress::total`].
     pub total: u32,
 }
 
 impl From<&Job> for JobStatus {
     fn from(job: &Job) -> Self {
-        Self { id: job.id.clone(), state: job.state, done: job.progress.done, total: job.progress.total }
+        let Progress { done, rejected, total, .. } = job.progress;
+        Self { id: job.id.clone(), state: job.state, done, rejected, total }
     }
 }

@@ -70,7 +70,7 @@ fn replies_are_flat_and_come_back() {
     let progress = comes_back(&JobProgress::from(&job));
     assert_eq!((&progress["stage"], &progress["rejected"]), (&"examples".into(), &1.into()));
     let status = comes_back(&JobStatus::from(&job));
-    assert_eq!(status, json!({"id": "0003", "state": "running", "done": 40, "total": 128}));
+    assert_eq!(status, json!({"id": "0003", "state": "running", "done": 40, "rejected": 1, "total": 128}));
 }
 
 #[test]

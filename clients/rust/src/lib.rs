@@ -20,6 +20,7 @@
 
 mod client;
 mod error;
+mod jobs;
 pub mod mesh;
 mod options;
 pub mod pattern;
@@ -32,6 +33,7 @@ pub mod trajectory;
 
 pub use client::Client;
 pub use error::ClientError;
+pub use jobs::FetchError;
 pub use options::ClientOptions;
 pub use plica_protocol as protocol;
 pub use publish::{PosePublisher, PoseSource, SourceClock};

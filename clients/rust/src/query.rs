@@ -45,10 +45,19 @@ impl Client {
 
     /// Calls a method with typed arguments and a typed reply (see `protocol::rpc`).
     pub fn call<Q: Serialize, R: DeserializeOwned>(&self, method: &str, request: &Q) -> Result<R, ClientError> {
+        self.call_within(method, request, self.timeout)
+    }
+
+    pub(crate) fn call_within<Q: Serialize, R: DeserializeOwned>(
+        &self,
+        method: &str,
+        request: &Q,
+        timeout: Duration,
+    ) -> Result<R, ClientError> {
         check_name(method)?;
         let key = self.keys.rpc(method);
         let json = serde_json::to_vec(request).map_err(|error| ClientError::Bus(error.to_string()))?;
-        let reply = self.ask(&key, Some(json))?;
+        let reply = self.ask_within(&key, Some(json), timeout)?;
         parse_json(&key, &reply.payload().to_bytes())
     }
 
@@ -85,46 +94,54 @@ impl Client {
                 announced = None;
                 continue;
             }
-            check_piece(key, &header, whole.len(), piece.len())?;
+            check_piece(key, &header, whole.len() as u64, piece.len())?;
+            if header.total_bytes > MAX_WHOLE_BYTES {
+                return Err(wrong_length(key, MAX_WHOLE_BYTES, header.total_bytes));
+            }
             whole.extend_from_slice(&piece);
             if whole.len() as u64 == header.total_bytes {
-                return check_sum(key, &header, whole);
+                check_sum(key, &header, Sha256::new_with_prefix(&whole))?;
+                return Ok(whole);
             }
             announced = Some(header);
         }
     }
 
     /// The first reply to a query.
-    fn ask(&self, selector: &str, payload: Option<Vec<u8>>) -> Result<Sample, ClientError> {
-        let query = self.session.get(selector).timeout(self.timeout);
+    pub(crate) fn ask(&self, selector: &str, payload: Option<Vec<u8>>) -> Result<Sample, ClientError> {
+        self.ask_within(selector, payload, self.timeout)
+    }
+
+    fn ask_within(&self, selector: &str, payload: Option<Vec<u8>>, timeout: Duration) -> Result<Sample, ClientError> {
+        let query = self.session.get(selector).timeout(timeout);
         let query = match payload {
             Some(json) => query.payload(json).encoding(Encoding::from(ENCODING_JSON)),
             None => query,
         };
         let replies = query.wait().map_err(ClientError::bus)?;
-        match replies.recv_timeout(self.timeout + GRACE) {
-            Ok(Some(reply)) => self.accept(selector, reply),
-            Ok(None) => Err(self.timed_out(selector)),
+        match replies.recv_timeout(timeout + GRACE) {
+            Ok(Some(reply)) => accept(selector, reply, timeout),
+            Ok(None) => Err(timed_out(selector, timeout)),
             Err(_) => Err(ClientError::NoAnswer { place: self.place.clone(), key: key_of(selector) }),
         }
     }
+}
 
-    fn accept(&self, selector: &str, reply: Reply) -> Result<Sample, ClientError> {
-        reply.into_result().map_err(|error| self.refusal(selector, &error))
-    }
+fn accept(selector: &str, reply: Reply, timeout: Duration) -> Result<Sample, ClientError> {
+    reply.into_result().map_err(|error| refusal(selector, &error, timeout))
+}
 
-    fn refusal(&self, selector: &str, error: &ReplyError) -> ClientError {
-        let payload = error.payload().to_bytes();
-        match serde_json::from_slice::<ErrorReply>(&payload) {
-            Ok(refused) => ClientError::Refused(refused),
-            Err(_) if &*payload == b"Timeout" => self.timed_out(selector),
-            Err(_) => ClientError::Bus(String::from_utf8_lossy(&payload).into_owned()),
-        }
+fn refusal(selector: &str, error: &ReplyError, timeout: Duration) -> ClientError {
+    let payload = error.payload().to_bytes();
+    match serde_json::from_slice::<ErrorReply>(&payload) {
+        Ok(refused) => ClientError::Refused(refused),
+        Err(_) if &*payload == b"Timeout" => timed_out(selector, timeout),
+        Err(_) => ClientError::Bus(String::from_utf8_lossy(&payload).into_owned()),
     }
+}
 
-    fn timed_out(&self, selector: &str) -> ClientError {
-        ClientError::TimedOut { key: key_of(selector), timeout: self.timeout }
-    }
+fn timed_out(selector: &str, timeout: Duration) -> ClientError {
+    ClientError::TimedOut { key: key_of(selector), timeout }
 }
 
 fn key_of(selector: &str) -> String {
@@ -138,27 +155,27 @@ fn parse_json<T: DeserializeOwned>(key: &str, bytes: &[u8]) -> Result<T, ClientE
         .map_err(|source| ClientError::Malformed { key: key.to_owned(), source })
 }
 
-fn chunk_header(key: &str, reply: &Sample) -> Result<ChunkHeader, ClientError> {
+pub(crate) fn chunk_header(key: &str, reply: &Sample) -> Result<ChunkHeader, ClientError> {
     let attachment = reply.attachment().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default();
     ChunkHeader::from_json(&attachment).map_err(|source| ClientError::Malformed { key: key.to_owned(), source })
 }
 
-fn check_piece(key: &str, header: &ChunkHeader, have: usize, got: usize) -> Result<(), ClientError> {
-    let left = header.total_bytes.saturating_sub(have as u64);
-    let starts_there = header.offset == have as u64;
+pub(crate) fn check_piece(key: &str, header: &ChunkHeader, have: u64, got: usize) -> Result<(), ClientError> {
+    let left = header.total_bytes.saturating_sub(have);
+    let starts_there = header.offset == have;
     let fits = (1..=left.max(1)).contains(&(got as u64)) || header.total_bytes == 0;
-    if starts_there && fits && header.total_bytes <= MAX_WHOLE_BYTES {
-        return Ok(());
-    }
-    let source = DecodeError::Length { expected: left, got: got as u64 };
-    Err(ClientError::Malformed { key: key.to_owned(), source })
+    if starts_there && fits { Ok(()) } else { Err(wrong_length(key, left, got as u64)) }
 }
 
-fn check_sum(key: &str, header: &ChunkHeader, whole: Vec<u8>) -> Result<Vec<u8>, ClientError> {
-    let got: String = Sha256::digest(&whole).iter().map(|byte| format!("{byte:02x}")).collect();
+fn wrong_length(key: &str, expected: u64, got: u64) -> ClientError {
+    ClientError::Malformed { key: key.to_owned(), source: DecodeError::Length { expected, got } }
+}
+
+/// Compares what has arrived with what was announced.
+pub(crate) fn check_sum(key: &str, header: &ChunkHeader, arrived: Sha256) -> Result<(), ClientError> {
+    let got: String = arrived.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
     if got == header.sha256 {
-        Ok(whole)
-    } else {
-        Err(ClientError::Checksum { key: key.to_owned(), expected: header.sha256.clone(), got })
+        return Ok(());
     }
+    Err(ClientError::Checksum { key: key.to_owned(), expected: header.sha256.clone(), got })
 }

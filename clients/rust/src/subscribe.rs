@@ -122,6 +122,18 @@ impl Client {
         })
     }
 
+    /// JSON messages of one key, at most `capacity` waiting.
+    pub(crate) fn subscribe_json<T: Send + 'static>(
+        &self,
+        key: &str,
+        capacity: usize,
+        read: fn(&[u8]) -> Result<T, DecodeError>,
+    ) -> Result<Subscription<T>, ClientError> {
+        self.subscribe(&[key.to_owned()], Queue::new(capacity, Overflow::DropOldest), move |sample| {
+            Ok((read(&sample.payload().to_bytes())?, None))
+        })
+    }
+
     fn subscribe<T: Send + 'static>(
         &self,
         key_expressions: &[String],

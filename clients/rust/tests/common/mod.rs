@@ -2,6 +2,8 @@
 #![allow(dead_code, reason = "not every test uses all of it")]
 #![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
+pub(crate) mod jobs;
+
 use std::net::TcpListener;
 
 use plica_client::protocol::chunk::{CHUNK_BYTES, ChunkHeader, offset_of, piece};
@@ -144,6 +146,9 @@ fn serve_mesh(query: Query) {
 fn serve_rpc(query: Query) {
     let name = query.key_expr().as_str().rsplit('/').next().unwrap().to_owned();
     let payload = query.payload().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default();
+    if name == "job_fetch" {
+        return jobs::fetch(&query, &payload);
+    }
     match answer_rpc(&name, &payload) {
         Ok(reply) => query.reply(query.key_expr().clone(), reply.to_string()).wait().unwrap(),
         Err(error) => query.reply_err(error.to_json()).wait().unwrap(),
@@ -157,6 +162,7 @@ fn answer_rpc(name: &str, payload: &[u8]) -> Result<serde_json::Value, ErrorRepl
             let reply = StepReply { tick: u64::from(request.ticks), sim_time_s: request.poses.len() as f64 };
             Ok(serde_json::to_value(reply).unwrap())
         }
+        method if method.is_about_jobs() => jobs::answer(method, payload),
         _ => Ok(json!({"tick": 0, "sim_time_s": 0.0, "paused": true})),
     }
 }

@@ -1,5 +1,7 @@
 //! The command line.
 
+pub(crate) mod jobs;
+
 use std::path::PathBuf;
 
 use clap::{Parser, Subcommand, ValueEnum};
@@ -55,6 +57,9 @@ pub(crate) enum Command {
     Record(Record),
     /// Publish the poses of a recording again, byte by byte.
     Replay(Replay),
+    /// Submit, watch and fetch long-running work: examples for enrichment.
+    #[command(subcommand)]
+    Jobs(jobs::Jobs),
     /// Call a method.
     Rpc(Rpc),
     /// Measure the time from a pose to the force that follows from it.
@@ -162,7 +167,7 @@ pub(crate) struct Replay {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Rpc {
-    /// reset, pause, resume, step, snapshot or restore.
+    /// reset, pause, resume, step, snapshot, restore, or one about jobs: job_list, job_get, ...
     pub(crate) method: String,
     /// Arguments as JSON.
     #[arg(default_value = "{}")]

@@ -2,6 +2,7 @@
 
 pub(crate) mod ask;
 pub(crate) mod export;
+pub(crate) mod jobs;
 pub(crate) mod latency;
 mod motion;
 pub(crate) mod probe;

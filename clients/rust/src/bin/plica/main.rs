@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use args::{Args, Command};
-use commands::{ask, export, latency, probe, record, replay};
+use commands::{ask, export, jobs, latency, probe, record, replay};
 use output::Output;
 
 fn main() -> ExitCode {
@@ -19,7 +19,7 @@ fn main() -> ExitCode {
     };
     let output = Output { json: args.common.json };
     match run(&args, output) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(error) => {
             output.error(&error);
             ExitCode::FAILURE
@@ -27,9 +27,10 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(args: &Args, output: Output) -> anyhow::Result<()> {
+fn run(args: &Args, output: Output) -> anyhow::Result<ExitCode> {
     let connect = || args.common.connect();
-    match &args.command {
+    let done = match &args.command {
+        Command::Jobs(command) => return jobs::run(&connect()?, command, output),
         Command::Status => ask::status(&connect()?, output),
         Command::Rpc(rpc) => ask::rpc(&connect()?, rpc, output),
         Command::Probe(probe) => probe::run(&connect()?, probe, output),
@@ -37,5 +38,6 @@ fn run(args: &Args, output: Output) -> anyhow::Result<()> {
         Command::Replay(replay) => replay::run(&connect()?, replay, output),
         Command::Latency(latency) => latency::run(&connect()?, latency, output),
         Command::Export(export) => export::run(&connect()?, export, output),
-    }
+    };
+    done.map(|()| ExitCode::SUCCESS)
 }

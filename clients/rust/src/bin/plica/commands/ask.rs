@@ -55,6 +55,11 @@ fn table(status: &Status) -> String {
         lines.extend(tool.poses_rejected.iter().map(|(kind, n)| format!("  rejected {kind}: {n}")));
     }
     lines.extend(status.rejected.iter().map(|(kind, n)| format!("rejected {kind}: {n}")));
+    for job in &status.jobs {
+        let rejected = if job.rejected == 0 { String::new() } else { format!(", {} rejected", job.rejected) };
+        lines.push(format!("job {}: {}, {} of {}{rejected}", job.id, job.state.name(), job.done, job.total));
+    }
+    lines.extend(status.jobs_unavailable.iter().map(|why| format!("no jobs: {why}")));
     lines.extend(status.realtime.warnings.iter().map(|warning| format!("warning: {warning}")));
     lines.join("\n")
 }
