@@ -1,0 +1,263 @@
+//! The accurate half of the tandem: quasi-static solves from rest, tied, loaded, or with contact of their own.
+
+use std::ops::ControlFlow;
+
+use nalgebra::Vector3;
+use plica_accurate::contact::{ContactError, ContactParams, ContactState, ContactSurface, Obstacle, Press, press};
+use plica_accurate::{Constraints, Energy, NodalForces, Params, Progress, Solid, SolveError, Solver, Tie, reactions};
+use plica_geometry::{Embedding, EmbeddingKind, HexIdx, HexMesh, NodeIdx, Skin, isoparametric};
+use serde::{Deserialize, Serialize};
+
+use crate::coarse::{Cancelled, Interrupted};
+use crate::error::BuildError;
+use crate::setup::AccurateDescription;
+use crate::way::Way;
+
+/// Largest force left at a free coordinate, as a share of the largest nodal force.
+const TOLERANCE: f64 = 1e-8;
+/// Newton steps after which a solve gives up.
+const MAX_ITERATIONS: u32 = 100;
+/// Load steps of a lift that does not converge at once.
+const LOAD_STEPS: u32 = 8;
+/// Increments of a press, as a share of the mean edge of the mesh.
+const INCREMENT_CELLS: f64 = 0.5;
+
+/// The accurate model, ready to be solved from rest again and again.
+pub struct Accurate {
+    rest: Vec<Vector3<f64>>,
+    solid: Solid,
+    weight: Option<NodalForces>,
+    constraints: Constraints,
+    /// Skin vertices as rows over the accurate nodes, trilinear.
+    embedding: Embedding,
+    surface: ContactSurface,
+    contact: ContactParams,
+    solver: Solver,
+}
+
+/// An equilibrium of the accurate model.
+#[derive(Debug, Clone)]
+pub struct AccurateResult {
+    /// Skin offsets from rest, `[n_skin]` \[m\].
+    pub offsets: Vec<Vector3<f64>>,
+    /// Force on the tool \[N\].
+    pub tool_force: Vector3<f64>,
+    /// How the solve went.
+    pub solve: SolveInfo,
+}
+
+/// How an accurate solve went.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SolveInfo {
+    /// Newton steps.
+    pub iterations: u32,
+    /// Newton steps whose matrix was not positive definite.
+    pub indefinite_steps: u32,
+    /// Largest force left at a free coordinate, as a share of the largest nodal force.
+    pub residual: f64,
+    /// Smallest `det F`.
+    pub smallest_jacobian: f64,
+}
+
+/// Why there is no equilibrium.
+#[derive(Debug)]
+pub enum AccurateFailure {
+    /// Asked to stop.
+    Interrupted,
+    /// It was not found.
+    Failed(String),
+}
+
+impl From<Interrupted> for AccurateFailure {
+    fn from(_: Interrupted) -> Self {
+        Self::Interrupted
+    }
+}
+
+impl Accurate {
+    /// Builds the model and analyses its sparsity; `skin` is what its results are given on.
+    ///
+    /// # Errors
+    /// See [`BuildError`].
+    pub fn new(
+        description: &AccurateDescription,
+        skin: &Skin,
+        gravity_m_per_s2: &Vector3<f64>,
+    ) -> Result<Self, BuildError> {
+        let mesh = &description.mesh;
+        let solid = Solid::new(mesh, &description.materials)?;
+        let rest: Vec<_> = mesh.nodes().iter().map(|p| p.coords).collect();
+        let mut constraints = Constraints::none(mesh.n_nodes());
+        let held = description.fixed.iter().enumerate().filter(|(_, fixed)| **fixed);
+        held.for_each(|(node, _)| constraints.hold(node, &rest[node]));
+        let embedding = Embedding::new(mesh, skin.positions(), EmbeddingKind::Trilinear)?;
+        let surface = ContactSurface::of_boundary(mesh, &constraints);
+        let moduli = description.materials.iter().map(|m| m.young_modulus_pa);
+        let softest = moduli.fold(f64::INFINITY, f64::min);
+        let contact = ContactParams::new(softest, INCREMENT_CELLS * mesh.mean_longest_edge());
+        let solver = Solver::new(&constraints, &[&solid]).map_err(SolveError::from)?;
+        let weight = (*gravity_m_per_s2 != Vector3::zeros())
+            .then(|| weight(mesh, &description.densities_kg_per_m3, gravity_m_per_s2));
+        Ok(Self { rest, solid, weight, constraints, embedding, surface, contact, solver })
+    }
+
+    /// Free unknowns, and values of the Cholesky factor.
+    pub fn size(&self) -> (usize, usize) {
+        self.solver.size()
+    }
+
+    /// Skin vertices as rows over the accurate nodes.
+    pub fn embedding(&self) -> &Embedding {
+        &self.embedding
+    }
+
+    /// From rest, tied.
+    ///
+    /// # Errors
+    /// See [`AccurateFailure`].
+    pub fn tied(&mut self, tie: &Tie, cancelled: Cancelled<'_>) -> Result<AccurateResult, AccurateFailure> {
+        let mut x = self.rest.clone();
+        let solve = self.minimise(&[tie], &mut x, cancelled)?;
+        Ok(AccurateResult { offsets: self.offsets(&x), tool_force: -tie.force(&x), solve })
+    }
+
+    /// From rest, under forces at skin vertices, `[n_skin]` \[N\]. In load steps if it does not converge at once.
+    ///
+    /// # Errors
+    /// See [`AccurateFailure`].
+    pub fn loaded(
+        &mut self,
+        skin_forces: &[Vector3<f64>],
+        cancelled: Cancelled<'_>,
+    ) -> Result<AccurateResult, AccurateFailure> {
+        let nodal = self.embedding.apply_transpose(skin_forces);
+        let share = |share: f64| {
+            let loads = nodal.iter().enumerate().filter(|(_, f)| **f != Vector3::zeros());
+            NodalForces::new(loads.map(|(n, f)| (NodeIdx::from_index(n), f * share)).collect())
+        };
+        let mut x = self.rest.clone();
+        let mut solve = self.minimise(&[&share(1.0)], &mut x, cancelled);
+        if let Err(AccurateFailure::Failed(_)) = solve {
+            x.copy_from_slice(&self.rest);
+            let mut sum = SolveInfo::default();
+            for step in 1..=LOAD_STEPS {
+                let load = share(f64::from(step) / f64::from(LOAD_STEPS));
+                sum = sum.followed_by(&self.minimise(&[&load], &mut x, cancelled)?);
+            }
+            solve = Ok(sum);
+        }
+        let tool_force = -skin_forces.iter().sum::<Vector3<f64>>();
+        Ok(AccurateResult { offsets: self.offsets(&x), tool_force, solve: solve? })
+    }
+
+    /// From rest, with the model's own unilateral frictional contact: the tool goes its way.
+    ///
+    /// # Errors
+    /// See [`AccurateFailure`].
+    pub fn pressed(
+        &mut self,
+        obstacle: &Obstacle,
+        friction: f64,
+        way: &Way,
+        cancelled: Cancelled<'_>,
+    ) -> Result<AccurateResult, AccurateFailure> {
+        let mut x = self.rest.clone();
+        if self.weight.is_some() {
+            self.minimise(&[], &mut x, cancelled)?;
+        }
+        let (start, path) = (way.poses()[0], &way.poses()[1..]);
+        let mut state = ContactState::untouched(&self.surface, &start, &x);
+        let energies: Vec<&dyn Energy> = energies(&self.solid, &self.weight, &[]);
+        let setting = Press {
+            energies: &energies,
+            constraints: &self.constraints,
+            surface: &self.surface,
+            obstacle,
+            friction,
+            params: self.contact,
+        };
+        let mut watch = |_| stop_if(cancelled());
+        let info = press(&setting, path, &mut self.solver, &mut state, &mut x, &mut watch).map_err(|e| match e {
+            ContactError::Cancelled { .. } => AccurateFailure::Interrupted,
+            other => AccurateFailure::Failed(other.to_string()),
+        })?;
+        let solve = SolveInfo {
+            iterations: info.newton_iterations,
+            indefinite_steps: info.indefinite_steps,
+            residual: info.residual,
+            smallest_jacobian: info.smallest_jacobian.unwrap_or(1.0),
+        };
+        Ok(AccurateResult { offsets: self.offsets(&x), tool_force: info.force_n, solve })
+    }
+
+    /// Force that the supports exert \[N\] at positions `x`, tool and weight not counted.
+    pub fn support_force(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
+        let forces = reactions(&[&self.solid], x);
+        let held = (0..x.len()).filter(|&n| self.constraints.is_given(n) == [true; 3]);
+        held.map(|n| forces[n]).sum()
+    }
+
+    fn minimise(
+        &mut self,
+        loads: &[&dyn Energy],
+        x: &mut [Vector3<f64>],
+        cancelled: Cancelled<'_>,
+    ) -> Result<SolveInfo, AccurateFailure> {
+        let energies = energies(&self.solid, &self.weight, loads);
+        let params = Params { tolerance: TOLERANCE, max_iterations: MAX_ITERATIONS };
+        let mut watch = |_: Progress| stop_if(cancelled());
+        match self.solver.minimise(&energies, &self.constraints, &params, x, &mut watch) {
+            Ok(info) => Ok(SolveInfo {
+                iterations: info.iterations,
+                indefinite_steps: info.indefinite_steps,
+                residual: info.residuals.last().copied().unwrap_or(0.0),
+                smallest_jacobian: info.smallest_jacobian.unwrap_or(1.0),
+            }),
+            Err(SolveError::Cancelled { .. }) => Err(AccurateFailure::Interrupted),
+            Err(error) => Err(AccurateFailure::Failed(error.to_string())),
+        }
+    }
+
+    /// `A_a (x_a - x_a(rest))`: the skin's own rest positions stay what they are.
+    fn offsets(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let displacements: Vec<_> = x.iter().zip(&self.rest).map(|(x, rest)| x - rest).collect();
+        self.embedding.apply(&displacements)
+    }
+}
+
+impl SolveInfo {
+    /// Of this solve and the one that went on from it.
+    pub fn followed_by(&self, next: &Self) -> Self {
+        Self {
+            iterations: self.iterations + next.iterations,
+            indefinite_steps: self.indefinite_steps + next.indefinite_steps,
+            ..*next
+        }
+    }
+}
+
+fn stop_if(stop: bool) -> ControlFlow<()> {
+    if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+}
+
+fn energies<'a>(solid: &'a Solid, weight: &'a Option<NodalForces>, loads: &[&'a dyn Energy]) -> Vec<&'a dyn Energy> {
+    let weight = weight.iter().map(|w| w as &dyn Energy);
+    std::iter::once(solid as &dyn Energy).chain(weight).chain(loads.iter().copied()).collect()
+}
+
+/// `f_a = int rho N_a dV g`, by 2 x 2 x 2 Gauss points.
+fn weight(mesh: &HexMesh, densities: &[f64], gravity: &Vector3<f64>) -> NodalForces {
+    let mut forces = Vec::with_capacity(8 * mesh.n_hexes());
+    for (hex, (nodes, density)) in mesh.hexes().iter().zip(densities).enumerate() {
+        let corners = mesh.corner_positions(HexIdx::from_index(hex));
+        let mut mass = [0.0; 8];
+        for xi in plica_accurate::GAUSS_POINTS {
+            let volume = isoparametric::jacobian(&corners, xi).determinant();
+            let shares = isoparametric::shape_functions(xi);
+            mass.iter_mut().zip(shares).for_each(|(m, share)| *m += density * volume * share);
+        }
+        forces.extend(nodes.iter().zip(mass).map(|(node, m)| (*node, gravity * m)));
+    }
+    NodalForces::new(forces)
+}

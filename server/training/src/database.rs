@@ -1,0 +1,182 @@
+//! The example database: one safetensors file (`server/training/FORMAT.md`).
+
+mod read;
+mod tensors;
+mod write;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use plica_accurate::TIE_VERSION;
+use serde::{Deserialize, Serialize};
+
+use crate::example::{Example, Record, Rejection};
+
+/// What the metadata calls the format.
+pub const FORMAT: &str = "plica-examples";
+/// Version of the format.
+pub const FORMAT_VERSION: u32 = 1;
+/// The only metadata key of the file.
+pub const METADATA_KEY: &str = "plica";
+/// Version of what an example is: interactions, drive, settling, acceptance. Databases of another one are refused.
+pub const TANDEM_VERSION: u32 = 1;
+/// Version of the accurate model and its solver: raised when its results change by more than rounding.
+pub const SOLVER_VERSION: u32 = 1;
+/// What `contact_point` means.
+pub const CONTACT_POINT: &str = "tool axis (z) on the deformed coarse skin, pulled back to the reference skin; for a ball, \
+                                 or where the axis misses, the centroid of weights 1 at gap <= 0 falling smoothly to 0 at 1 mm";
+
+/// Examples of one scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Database {
+    /// What holds for all of them.
+    pub about: About,
+    /// Examples in the order of their interactions.
+    pub examples: Vec<Example>,
+    /// Interactions that gave none.
+    pub rejected: Vec<Rejection>,
+}
+
+/// What holds for all examples of a database.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct About {
+    /// The scene they belong to.
+    pub scene_hash: String,
+    /// What they are for.
+    pub kind: JobKind,
+    /// Seed of the interactions.
+    pub seed: u64,
+    /// What random numbers are.
+    pub generator: String,
+    /// What a contact point is.
+    pub contact_point: String,
+    /// Versions of `tandem`, `solver` and `tie`.
+    pub versions: BTreeMap<String, u32>,
+}
+
+/// What examples are for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JobKind {
+    /// Examples to learn from.
+    Training,
+    /// Held-out interactions that are never trained on.
+    Evaluation,
+}
+
+impl JobKind {
+    /// As in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Training => "training",
+            Self::Evaluation => "evaluation",
+        }
+    }
+}
+
+impl About {
+    /// Of a database made by this version of the program.
+    pub fn new(scene_hash: &str, kind: JobKind, seed: u64) -> Self {
+        Self {
+            scene_hash: scene_hash.to_owned(),
+            kind,
+            seed,
+            generator: crate::random::GENERATOR.to_owned(),
+            contact_point: CONTACT_POINT.to_owned(),
+            versions: versions(),
+        }
+    }
+}
+
+/// Versions that the examples depend on.
+pub fn versions() -> BTreeMap<String, u32> {
+    let named = [("tandem", TANDEM_VERSION), ("solver", SOLVER_VERSION), ("tie", TIE_VERSION)];
+    named.into_iter().map(|(name, version)| (name.to_owned(), version)).collect()
+}
+
+/// Why a file is no database that can be used.
+#[derive(Debug, thiserror::Error)]
+pub enum DatabaseError {
+    /// It cannot be read.
+    #[error("{path}: {source}", path = path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// It is cut off, or no safetensors file.
+    #[error("{path}: truncated, or not a safetensors file: {problem}", path = path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+    /// It is a safetensors file of something else.
+    #[error("{path}: not an example database: {problem}", path = path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// What is missing.
+        problem: String,
+    },
+    /// It was written by another version.
+    #[error("{path}: {what} version {found}, this program reads {known}; train again", path = path.display())]
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// Of what.
+        what: String,
+        /// The file's.
+        found: String,
+        /// The program's.
+        known: u32,
+    },
+    /// It belongs to another scene.
+    #[error(
+        "{path}: belongs to another scene (hash {found:.12}..., this scene has {expected:.12}...): object, materials, \
+         coarse or accurate model, friction, tie or tool differ; train again",
+        path = path.display()
+    )]
+    OtherScene {
+        /// The file.
+        path: PathBuf,
+        /// The file's.
+        found: String,
+        /// The scene's.
+        expected: String,
+    },
+    /// Bytes have changed since it was written.
+    #[error("{path}: damaged: SHA-256 is {found:.12}..., the file says {expected:.12}...", path = path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// Of the bytes.
+        found: String,
+        /// What the file says.
+        expected: String,
+    },
+    /// Tensors and metadata do not fit each other.
+    #[error("{path}: inconsistent: {problem}", path = path.display())]
+    Inconsistent {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+}
+
+/// The value of the metadata key.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Metadata {
+    format: String,
+    format_version: u32,
+    about: About,
+    examples: Vec<Record>,
+    rejected: Vec<Rejection>,
+    /// See [`tensors::checksum`].
+    sha256: String,
+}

@@ -1,0 +1,104 @@
+//! Why nothing was trained.
+
+use std::path::PathBuf;
+
+use plica_accurate::contact::PolytopeError;
+use plica_accurate::{SolidError, SolveError};
+use plica_geometry::EmbeddingError;
+use plica_sim::ModelError;
+
+/// Why there are no interactions.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanError {
+    /// No part of the skin lies in the region and faces the tool.
+    #[error("set `{set}`: no part of the skin lies in its region and faces the tool")]
+    NoSkin {
+        /// The set.
+        set: String,
+    },
+    /// No recorded pose touches the object.
+    #[error("set `{set}`: none of {n_poses} recorded poses of its tool presses the object at rest")]
+    NothingTouched {
+        /// The set.
+        set: String,
+        /// Poses of its tool.
+        n_poses: usize,
+    },
+    /// Every interaction was rejected.
+    #[error("all {n} interactions were rejected; the first one: {first}")]
+    AllRejected {
+        /// How many.
+        n: usize,
+        /// Why the first one was.
+        first: String,
+    },
+}
+
+/// Why a model of the scene cannot be built.
+#[derive(Debug, thiserror::Error)]
+pub enum BuildError {
+    /// The coarse model.
+    #[error("coarse model: {0}")]
+    Coarse(#[from] ModelError),
+    /// The accurate model.
+    #[error("accurate model: {0}")]
+    Accurate(#[from] SolidError),
+    /// The accurate model's matrix.
+    #[error("accurate model: {0}")]
+    Solver(#[from] SolveError),
+    /// The skin does not lie in the accurate mesh.
+    #[error("accurate model: {0}")]
+    Embedding(#[from] EmbeddingError),
+    /// A tool without volume.
+    #[error("tool `{tool}`: {source}")]
+    Tool {
+        /// The tool.
+        tool: String,
+        /// Why.
+        source: PolytopeError,
+    },
+    /// Something that the accurate model cannot do yet.
+    #[error("the accurate model knows no {what}; remove them from the scene to train on it")]
+    Unsupported {
+        /// What.
+        what: &'static str,
+    },
+}
+
+/// Why a job has no result.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainingError {
+    /// No interactions.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// No model.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// A file of the job cannot be written or read. Finished examples are kept.
+    #[error("{path}: {source}", path = path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A file of the job is not what it should be.
+    #[error("{path}: {problem}", path = path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it, and what to do.
+        problem: String,
+    },
+    /// Asked to stop. Finished examples are kept.
+    #[error("interrupted; what is finished is kept, the same command goes on from there")]
+    Interrupted,
+    /// Threads cannot be started.
+    #[error("{n_threads} threads cannot be started: {reason}")]
+    Threads {
+        /// How many.
+        n_threads: usize,
+        /// What the system said.
+        reason: String,
+    },
+}

@@ -1,0 +1,270 @@
+//! The folder of a job: what was asked, what is finished, what came of it. Everything in it is written atomically.
+//!
+//! ```text
+//! job.json              what was asked; written once, by whoever submits
+//! progress.json         after every interaction
+//! examples/00007.safetensors, examples/00007.rejected.json
+//! database.safetensors, report.json
+//! ```
+
+use std::fs::{self, File, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use crate::database::{About, Database, DatabaseError, JobKind};
+use crate::error::TrainingError;
+use crate::example::{Example, Outcome, Rejection};
+use crate::files::{remove_leftovers, write_atomically};
+
+/// What a job was asked for, `job.json`. What is left out is the scene's to say.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Job {
+    /// Name of the job.
+    pub id: String,
+    /// Chosen by the client that submitted it.
+    pub client_id: String,
+    /// What the examples are for.
+    pub kind: JobKind,
+    /// Name of the scene, for people.
+    pub scene_name: String,
+    /// How many examples; of an evaluation: in the trained region.
+    #[serde(default)]
+    pub examples: Option<u32>,
+    /// Seed of the interactions.
+    #[serde(default)]
+    pub seed: Option<u64>,
+    /// Threads.
+    #[serde(default)]
+    pub threads: Option<u32>,
+    /// When it was submitted \[s since 1970\].
+    pub submitted_unix_s: u64,
+}
+
+/// Where a job stands, `progress.json`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Progress {
+    /// What it is at.
+    pub stage: Stage,
+    /// Examples that are on the disk.
+    pub done: u32,
+    /// Interactions that gave none.
+    pub rejected: u32,
+    /// Interactions in all.
+    pub total: u32,
+    /// Estimate \[s\]; `None` before the first interaction of this run is finished.
+    pub seconds_left: Option<f64>,
+}
+
+/// What a job is at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stage {
+    /// Draws interactions and builds the models.
+    Interactions,
+    /// Solves them.
+    Examples,
+    /// Writes the database.
+    Database,
+}
+
+/// The folder of a job.
+#[derive(Debug)]
+pub struct Folder {
+    root: PathBuf,
+    /// Held while the folder is open: two processes at one job would do everything twice.
+    _lock: File,
+}
+
+impl Folder {
+    /// Opens the folder, makes what it lacks, and clears away what a killed process left half written.
+    ///
+    /// # Errors
+    /// It cannot be written, or another process works in it.
+    pub fn open(root: &Path) -> Result<Self, TrainingError> {
+        let examples = root.join("examples");
+        let at = |path: &Path| {
+            let path = path.to_owned();
+            move |source| TrainingError::Io { path, source }
+        };
+        fs::create_dir_all(&examples).map_err(at(&examples))?;
+        let lock_path = root.join(".lock");
+        let lock = File::create(&lock_path).map_err(at(&lock_path))?;
+        lock.try_lock().map_err(|e| match e {
+            TryLockError::WouldBlock => TrainingError::File {
+                path: root.to_owned(),
+                problem: "another process works in this folder; wait for it or stop it".into(),
+            },
+            TryLockError::Error(source) => TrainingError::Io { path: lock_path.clone(), source },
+        })?;
+        remove_leftovers(root).map_err(at(root))?;
+        remove_leftovers(&examples).map_err(at(&examples))?;
+        Ok(Self { root: root.to_owned(), _lock: lock })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.root
+    }
+
+    /// Where the database is, or will be.
+    pub fn database(&self) -> PathBuf {
+        self.root.join("database.safetensors")
+    }
+
+    /// Where the report is, or will be.
+    pub fn report(&self) -> PathBuf {
+        self.root.join("report.json")
+    }
+
+    /// What was asked.
+    ///
+    /// # Errors
+    /// `job.json` is missing or not what it should be.
+    pub fn job(&self) -> Result<Job, TrainingError> {
+        let path = self.root.join("job.json");
+        match read_json(&path)? {
+            Some(job) => Ok(job),
+            None => Err(TrainingError::File { path, problem: "is missing: this is no job folder".into() }),
+        }
+    }
+
+    /// States what is asked. A folder that holds another job already is refused.
+    ///
+    /// # Errors
+    /// It cannot be written, or belongs to another job.
+    pub fn set_job(&self, job: &Job) -> Result<(), TrainingError> {
+        let path = self.root.join("job.json");
+        let asks = |j: &Job| (j.kind, j.examples, j.seed);
+        if let Some(found) = read_json::<Job>(&path)?.filter(|found| asks(found) != asks(job)) {
+            let problem = format!(
+                "the folder holds another job ({} {:?} with seed {:?}); choose another folder, or remove this one",
+                found.kind.name(),
+                found.examples,
+                found.seed
+            );
+            return Err(TrainingError::File { path, problem });
+        }
+        self.write_json(&path, job)
+    }
+
+    /// States where the job stands.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn set_progress(&self, progress: &Progress) -> Result<(), TrainingError> {
+        self.write_json(&self.root.join("progress.json"), progress)
+    }
+
+    /// Writes the report.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn set_report(&self, report: &impl Serialize) -> Result<(), TrainingError> {
+        self.write_json(&self.report(), report)
+    }
+
+    /// Puts a finished interaction on the disk.
+    ///
+    /// # Errors
+    /// It cannot be written; a full disk is the usual cause.
+    pub fn store(&self, about: &About, outcome: &Outcome) -> Result<(), TrainingError> {
+        match outcome {
+            Outcome::Accepted(example) => {
+                let path = self.example(example.record.index);
+                let one = Database { about: about.clone(), examples: vec![(**example).clone()], rejected: Vec::new() };
+                one.write(&path).map_err(|e| from_database(e, &path))
+            }
+            Outcome::Rejected(rejection) => {
+                let stored = StoredRejection { about: about.clone(), rejection: rejection.clone() };
+                self.write_json(&self.rejection(rejection.index), &stored)
+            }
+        }
+    }
+
+    /// What became of an interaction, if it is finished. A file that is damaged counts as not finished.
+    ///
+    /// # Errors
+    /// It belongs to another scene, version or plan: going on would mix two jobs.
+    pub fn finished(&self, about: &About, index: u32, fingerprint: &str) -> Result<Option<Outcome>, TrainingError> {
+        let path = self.example(index);
+        let (path, found, outcome) = if path.exists() {
+            match self.read_example(&path)? {
+                Some((found, example)) => {
+                    (path, (found, example.record.interaction_sha256.clone()), Outcome::Accepted(Box::new(example)))
+                }
+                None => return Ok(None),
+            }
+        } else {
+            let path = self.rejection(index);
+            match read_json::<StoredRejection>(&path) {
+                Ok(Some(StoredRejection { about, rejection })) => {
+                    (path, (about, rejection.interaction_sha256.clone()), Outcome::Rejected(rejection))
+                }
+                Ok(None) | Err(TrainingError::File { .. }) => return Ok(None),
+                Err(error) => return Err(error),
+            }
+        };
+        if found == (about.clone(), fingerprint.to_owned()) {
+            return Ok(Some(outcome));
+        }
+        let problem = if found.0.scene_hash == about.scene_hash {
+            "was made for another plan or version; choose another folder, or remove this one"
+        } else {
+            "was made for another scene; choose another folder, or remove this one"
+        };
+        Err(TrainingError::File { path, problem: problem.into() })
+    }
+
+    fn read_example(&self, path: &Path) -> Result<Option<(About, Example)>, TrainingError> {
+        match Database::read(path, None) {
+            Ok(mut one) if one.examples.len() == 1 => Ok(Some((one.about, one.examples.remove(0)))),
+            Ok(_) | Err(DatabaseError::Malformed { .. } | DatabaseError::Damaged { .. }) => Ok(None),
+            Err(error) => Err(from_database(error, path)),
+        }
+    }
+
+    fn example(&self, index: u32) -> PathBuf {
+        self.root.join("examples").join(format!("{index:05}.safetensors"))
+    }
+
+    fn rejection(&self, index: u32) -> PathBuf {
+        self.root.join("examples").join(format!("{index:05}.rejected.json"))
+    }
+
+    fn write_json(&self, path: &Path, value: &impl Serialize) -> Result<(), TrainingError> {
+        let at = |source| TrainingError::Io { path: path.to_owned(), source };
+        let mut text = serde_json::to_vec_pretty(value).map_err(|e| at(io::Error::other(e)))?;
+        text.push(b'\n');
+        write_atomically(path, &text).map_err(at)
+    }
+}
+
+/// A rejection as it lies beside the examples.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredRejection {
+    about: About,
+    rejection: Rejection,
+}
+
+fn from_database(error: DatabaseError, path: &Path) -> TrainingError {
+    match error {
+        DatabaseError::Io { path, source } => TrainingError::Io { path, source },
+        other => TrainingError::File { path: path.to_owned(), problem: other.to_string() },
+    }
+}
+
+/// `None` if there is no such file.
+fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, TrainingError> {
+    let text = match fs::read(path) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(source) => return Err(TrainingError::Io { path: path.to_owned(), source }),
+        Ok(text) => text,
+    };
+    let value = serde_json::from_slice(&text);
+    value.map(Some).map_err(|e| TrainingError::File { path: path.to_owned(), problem: format!("is damaged: {e}") })
+}

@@ -1,0 +1,199 @@
+//! What a job did: `report.json`. What another machine would find as well stands apart from how long it took here.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::accurate::SolveInfo;
+use crate::database::{Database, JobKind};
+use crate::example::{Record, Rejection};
+use crate::reference::ReferenceSkin;
+use crate::setup::Setup;
+
+/// What a job did.
+#[derive(Debug, Clone, Serialize)]
+pub struct Report {
+    /// The scene.
+    pub scene_hash: String,
+    /// What the examples are for.
+    pub kind: JobKind,
+    /// Seed of the interactions.
+    pub seed: u64,
+    /// The same on every machine, up to rounding.
+    pub result: Summary,
+    /// Of this run on this machine.
+    pub run: Run,
+}
+
+/// Figures that another machine would find as well.
+#[derive(Debug, Clone, Serialize)]
+pub struct Summary {
+    /// Interactions asked for.
+    pub interactions: usize,
+    /// Examples in the database.
+    pub examples: usize,
+    /// Examples of each set.
+    pub kinds: BTreeMap<String, usize>,
+    /// Hexahedra of the accurate model.
+    pub accurate_hexes: usize,
+    /// Its free unknowns.
+    pub accurate_unknowns: usize,
+    /// Values of its Cholesky factor.
+    pub factor_values: usize,
+    /// Solves tied to the coarse imprint.
+    pub tied: Option<Solves>,
+    /// Solves with contact of their own.
+    pub independent: Option<Solves>,
+    /// Simulated time until the coarse model counted as settled \[s\].
+    pub settle_s: Option<Spread>,
+    /// Farthest that a node still moved in the last window \[m\].
+    pub residual_motion_m: Option<Spread>,
+    /// Tied skin vertices.
+    pub n_tied: Option<Spread>,
+    /// Area-weighted RMS of `d` over the skin \[m\].
+    pub detail_rms_m: Option<Spread>,
+    /// Largest `|d|` of an example \[m\].
+    pub detail_max_m: Option<Spread>,
+    /// The same against the accurate model's own contact \[m\].
+    pub independent_rms_m: Option<Spread>,
+    /// Interactions without an example, with the reason.
+    pub rejected: Vec<Rejection>,
+}
+
+/// Newton solves of all examples.
+#[derive(Debug, Clone, Serialize)]
+pub struct Solves {
+    /// Newton steps per example.
+    pub iterations: Spread,
+    /// Newton steps whose matrix was not positive definite, in all.
+    pub indefinite_steps: u64,
+    /// Smallest `det F` per example.
+    pub smallest_jacobian: Spread,
+    /// Largest force left, as a share of the largest nodal force.
+    pub residual: Spread,
+}
+
+/// Least, median, mean and largest.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spread {
+    /// Least.
+    pub min: f64,
+    /// Median.
+    pub median: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+/// How long it took here.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Run {
+    /// Threads.
+    pub threads: usize,
+    /// Wall time of this run \[s\].
+    pub wall_s: f64,
+    /// Interactions solved in this run.
+    pub solved: usize,
+    /// Interactions that earlier runs had finished.
+    pub resumed: usize,
+    /// Mean time of an interaction in this run \[s\].
+    pub mean_s: Option<f64>,
+    /// Longest \[s\].
+    pub max_s: Option<f64>,
+}
+
+impl Report {
+    /// Of a finished job; `sizes` are free unknowns and factor values of the accurate model.
+    pub(crate) fn new(
+        setup: &Setup,
+        database: &Database,
+        interactions: usize,
+        (accurate_unknowns, factor_values): (usize, usize),
+        run: Run,
+    ) -> Self {
+        let examples = &database.examples;
+        let records = || examples.iter().map(|e| &e.record);
+        let mut kinds = BTreeMap::new();
+        records().for_each(|r| *kinds.entry(r.kind.clone()).or_insert(0) += 1);
+        let areas = ReferenceSkin::new(&setup.coarse.skin).vertex_areas().to_vec();
+        let details = || examples.iter().map(|e| &e.detail);
+        let own = || examples.iter().filter_map(|e| e.independent_detail.as_ref());
+        let result = Summary {
+            interactions,
+            examples: examples.len(),
+            kinds,
+            accurate_hexes: setup.accurate.mesh.n_hexes(),
+            accurate_unknowns,
+            factor_values,
+            tied: Solves::of(records().map(|r| r.tied)),
+            independent: Solves::of(records().filter_map(|r| r.independent)),
+            settle_s: Spread::of(records().map(|r: &Record| r.settling.time_s)),
+            residual_motion_m: Spread::of(records().map(|r| r.settling.motion_m)),
+            n_tied: Spread::of(records().map(|r| f64::from(r.n_tied))),
+            detail_rms_m: Spread::of(details().map(|d| rms(d, &areas))),
+            detail_max_m: Spread::of(details().map(|d| largest(d))),
+            independent_rms_m: Spread::of(own().map(|d| rms(d, &areas))),
+            rejected: database.rejected.clone(),
+        };
+        let about = &database.about;
+        Self { scene_hash: about.scene_hash.clone(), kind: about.kind, seed: about.seed, result, run }
+    }
+}
+
+impl Solves {
+    fn of(solves: impl Iterator<Item = SolveInfo>) -> Option<Self> {
+        let solves: Vec<_> = solves.collect();
+        Some(Self {
+            iterations: Spread::of(solves.iter().map(|s| f64::from(s.iterations)))?,
+            indefinite_steps: solves.iter().map(|s| u64::from(s.indefinite_steps)).sum(),
+            smallest_jacobian: Spread::of(solves.iter().map(|s| s.smallest_jacobian))?,
+            residual: Spread::of(solves.iter().map(|s| s.residual))?,
+        })
+    }
+}
+
+impl Spread {
+    /// `None` without a value.
+    pub fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
+        let mut sorted: Vec<f64> = values.collect();
+        sorted.sort_by(f64::total_cmp);
+        let (min, max) = (*sorted.first()?, *sorted.last()?);
+        let n = sorted.len();
+        let median = 0.5 * (sorted[(n - 1) / 2] + sorted[n / 2]);
+        Some(Self { min, median, mean: sorted.iter().sum::<f64>() / n as f64, max })
+    }
+}
+
+/// Root of the area-weighted mean of `|v|^2` over the skin.
+pub(crate) fn rms(field: &[[f32; 3]], areas: &[f64]) -> f64 {
+    let squared = |v: &[f32; 3]| v.iter().map(|c| f64::from(*c).powi(2)).sum::<f64>();
+    let sum: f64 = field.iter().zip(areas).map(|(v, area)| area * squared(v)).sum();
+    (sum / areas.iter().sum::<f64>()).sqrt()
+}
+
+/// Largest `|v|`.
+pub(crate) fn largest(field: &[[f32; 3]]) -> f64 {
+    let squared = |v: &[f32; 3]| v.iter().map(|c| f64::from(*c).powi(2)).sum::<f64>();
+    field.iter().map(squared).fold(0.0, f64::max).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+    use super::*;
+
+    #[test]
+    fn a_spread_is_that_of_its_values() {
+        let spread = Spread::of([3.0, 1.0, 2.0, 10.0].into_iter()).unwrap();
+        assert_eq!((spread.min, spread.median, spread.mean, spread.max), (1.0, 2.5, 4.0, 10.0));
+        assert!(Spread::of(std::iter::empty()).is_none());
+    }
+
+    #[test]
+    fn rms_is_weighted_by_area() {
+        assert!((rms(&[[3.0, 0.0, 4.0], [0.0; 3]], &[1.0, 3.0]) - 2.5).abs() < 1e-12);
+        assert_eq!(largest(&[[3.0, 0.0, 4.0], [0.0; 3]]), 5.0);
+    }
+}

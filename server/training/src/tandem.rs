@@ -1,0 +1,271 @@
+//! The tandem solve of one interaction \[SSH12, 4.1\]: the coarse model settles, then the accurate one follows its imprint.
+
+use nalgebra::Isometry3;
+use plica_accurate::contact::Obstacle;
+use plica_accurate::{Tie, TieTarget};
+
+use crate::accurate::{Accurate, AccurateFailure, AccurateResult, SolveInfo};
+use crate::band::{around_tool, under_disc};
+use crate::canonical::fingerprint;
+use crate::coarse::{Cancelled, Coarse, CoarseResult, Interrupted};
+use crate::error::BuildError;
+use crate::example::{Example, Outcome, Reason, Record, Rejection, difference, numbers, rows, to_f32};
+use crate::interaction::{Action, Interaction, to_numbers};
+use crate::lift::{Disc, lift};
+use crate::obstacle::obstacle;
+use crate::reference::{ReferenceSkin, SurfacePoint};
+use crate::setup::Setup;
+use crate::way::Way;
+
+/// A result with an element below this `det F` is not stored.
+pub const SMALLEST_JACOBIAN: f64 = 0.05;
+
+/// Both models of a scene, and what one thread needs to solve interactions.
+pub struct Tandem<'a> {
+    setup: &'a Setup,
+    skin: ReferenceSkin,
+    obstacles: Vec<Obstacle>,
+    coarse: Coarse,
+    accurate: Accurate,
+}
+
+/// The coarse half of an interaction.
+#[derive(Debug, Clone)]
+pub struct CoarseHalf {
+    /// The settled state.
+    pub state: CoarseResult,
+    /// Contact point on the reference skin.
+    pub contact: SurfacePoint,
+    /// Where the tool is.
+    pub pose: Isometry3<f64>,
+    /// Skin vertices in the contact band.
+    pub targets: Vec<TieTarget>,
+    /// What acts on the object.
+    pub load: Load,
+}
+
+/// What acts on the object.
+#[derive(Debug, Clone)]
+pub enum Load {
+    /// A tool that went this way.
+    Tool(Way),
+    /// Forces at skin vertices, `[n_skin]` \[N\].
+    Suction(Vec<nalgebra::Vector3<f64>>),
+}
+
+/// Why there is no half.
+#[derive(Debug)]
+pub enum Stop {
+    /// Asked to stop.
+    Interrupted,
+    /// The interaction is rejected.
+    Rejected(Reason, String),
+}
+
+impl From<Interrupted> for Stop {
+    fn from(_: Interrupted) -> Self {
+        Self::Interrupted
+    }
+}
+
+impl<'a> Tandem<'a> {
+    /// Builds both models.
+    ///
+    /// # Errors
+    /// See [`BuildError`].
+    pub fn new(setup: &'a Setup) -> Result<Self, BuildError> {
+        let coarse = &setup.coarse;
+        if !coarse.planes.is_empty() {
+            return Err(BuildError::Unsupported { what: "supports.planes" });
+        }
+        let obstacles = coarse
+            .tools
+            .iter()
+            .map(|tool| obstacle(&tool.shape).map_err(|source| BuildError::Tool { tool: tool.name.clone(), source }));
+        Ok(Self {
+            skin: ReferenceSkin::new(&coarse.skin),
+            obstacles: obstacles.collect::<Result<_, _>>()?,
+            accurate: Accurate::new(&setup.accurate, &coarse.skin, &coarse.gravity_m_per_s2)?,
+            coarse: Coarse::new(coarse, &setup.drive)?,
+            setup,
+        })
+    }
+
+    /// The skin at rest.
+    pub fn skin(&self) -> &ReferenceSkin {
+        &self.skin
+    }
+
+    /// The accurate model.
+    pub fn accurate(&mut self) -> &mut Accurate {
+        &mut self.accurate
+    }
+
+    /// Solves an interaction; `with_independent` by the accurate model's own contact as well.
+    ///
+    /// # Errors
+    /// [`Interrupted`].
+    pub fn solve(
+        &mut self,
+        index: u32,
+        interaction: &Interaction,
+        with_independent: bool,
+        cancelled: Cancelled<'_>,
+    ) -> Result<Outcome, Interrupted> {
+        match self.try_solve(index, interaction, with_independent, cancelled) {
+            Ok(example) if example.is_finite() => Ok(Outcome::Accepted(Box::new(example))),
+            Ok(_) => Ok(rejected(index, interaction, Reason::NotFinite, "a number of the result is not finite".into())),
+            Err(Stop::Rejected(reason, message)) => Ok(rejected(index, interaction, reason, message)),
+            Err(Stop::Interrupted) => Err(Interrupted),
+        }
+    }
+
+    fn try_solve(
+        &mut self,
+        index: u32,
+        interaction: &Interaction,
+        with_independent: bool,
+        cancelled: Cancelled<'_>,
+    ) -> Result<Example, Stop> {
+        let half = self.solve_coarse(interaction, cancelled)?;
+        let tied = self.solve_tied(&half, cancelled)?;
+        let independent =
+            if with_independent { Some(self.solve_independent(interaction, &half, cancelled)?) } else { None };
+        let offsets = &half.state.offsets;
+        Ok(Example {
+            displacements: half.state.displacements.iter().map(to_f32).collect(),
+            detail: difference(&tied.offsets, offsets),
+            independent_detail: independent.as_ref().map(|r| difference(&r.offsets, offsets)),
+            contact_point: numbers(&half.contact.position),
+            contact_frame: rows(&self.skin.frame(&half.contact, &self.setup.stamp_axes)),
+            tool_pose: to_numbers(&half.pose),
+            coarse_force: half.state.tool_force.into(),
+            tied_force: tied.tool_force.into(),
+            independent_force: independent.as_ref().map(|r| r.tool_force.into()),
+            record: Record {
+                index,
+                kind: interaction.kind.clone(),
+                tool: interaction.tool,
+                depth_m: interaction.depth_m(),
+                drag_m: interaction.drag().into(),
+                settling: (&half.state.settling).into(),
+                n_tied: half.targets.len() as u32,
+                tied: tied.solve,
+                independent: independent.map(|r| r.solve),
+                interaction_sha256: fingerprint(interaction),
+            },
+        })
+    }
+
+    /// The coarse model settles at the interaction.
+    ///
+    /// # Errors
+    /// See [`Stop`].
+    pub fn solve_coarse(&mut self, interaction: &Interaction, cancelled: Cancelled<'_>) -> Result<CoarseHalf, Stop> {
+        let half = match &interaction.action {
+            Action::Lift { height_m, radius_m } => self.lift_coarse(interaction, (*height_m, *radius_m), cancelled)?,
+            _ => self.press_coarse(interaction, cancelled)?,
+        };
+        let settling = &half.state.settling;
+        if settling.rollbacks > 0 {
+            return Err(Stop::Rejected(
+                Reason::CoarseUnstable,
+                format!("{} states were rolled back", settling.rollbacks),
+            ));
+        }
+        if !settling.settled {
+            let (um, time_s) = (1e6 * settling.motion_m, settling.time_s);
+            let message = format!("a node still moves by {um:.1} um per window after {time_s:.1} s");
+            return Err(Stop::Rejected(Reason::NotSettled, message));
+        }
+        Ok(half)
+    }
+
+    fn press_coarse(&mut self, interaction: &Interaction, cancelled: Cancelled<'_>) -> Result<CoarseHalf, Stop> {
+        let (tool, setup) = (interaction.tool as usize, self.setup);
+        let nothing = || Stop::Rejected(Reason::NothingTouched, "the tool passes the object by".into());
+        let way = Way::of(interaction, &self.obstacles[tool], &self.skin).ok_or_else(nothing)?;
+        let state = self.coarse.press(tool, &way, &setup.drive, cancelled)?;
+        let contact = self.skin.nearest(&state.contact_point.ok_or_else(nothing)?);
+        let targets = around_tool(&self.skin, &state.offsets, &self.obstacles[tool], way.end(), &setup.tie);
+        if targets.is_empty() {
+            return Err(nothing());
+        }
+        Ok(CoarseHalf { contact, pose: *way.end(), targets, load: Load::Tool(way), state })
+    }
+
+    fn lift_coarse(
+        &mut self,
+        interaction: &Interaction,
+        (height_m, radius_m): (f64, f64),
+        cancelled: Cancelled<'_>,
+    ) -> Result<CoarseHalf, Stop> {
+        let disc = Disc { centre: interaction.contact_point(), normal: interaction.normal(), radius_m };
+        let contact = self.skin.nearest(&disc.centre);
+        let modulus_pa = self.setup.tie.young_modulus_pa;
+        let target = (height_m, modulus_pa);
+        let lifted = lift(&mut self.coarse, &self.skin, (&disc, &contact), target, &self.setup.drive, cancelled)?;
+        if !lifted.reached {
+            let message = format!("{:.2} mm of {:.2} mm", 1e3 * lifted.height_m, 1e3 * height_m);
+            return Err(Stop::Rejected(Reason::HeightNotReached, message));
+        }
+        let mut state = lifted.state;
+        state.tool_force = -lifted.skin_forces.iter().sum::<nalgebra::Vector3<f64>>();
+        let targets = under_disc(&self.skin, &state.offsets, &disc, &self.setup.tie);
+        // The tool only marks the place: its axis along the normal, its tip where the skin was raised to.
+        let turned = crate::interaction::rotation(crate::interaction::orientation(&-disc.normal));
+        let raised = disc.centre + disc.normal * (lifted.height_m + radius_m);
+        let pose = Isometry3::from_parts(raised.coords.into(), turned);
+        Ok(CoarseHalf { contact, pose, targets, load: Load::Suction(lifted.skin_forces), state })
+    }
+
+    /// The accurate model follows the coarse imprint.
+    ///
+    /// # Errors
+    /// See [`Stop`].
+    pub fn solve_tied(&mut self, half: &CoarseHalf, cancelled: Cancelled<'_>) -> Result<AccurateResult, Stop> {
+        let tie = Tie::new(self.accurate.embedding(), &half.targets, &self.setup.tie);
+        let result = self.accurate.tied(&tie, cancelled);
+        accept(result, Reason::TiedNotConverged, Reason::TiedInverted)
+    }
+
+    /// The accurate model under the tool itself, or under the same suction: nothing is taken from the coarse model but the
+    /// pressure that raised it.
+    ///
+    /// # Errors
+    /// See [`Stop`].
+    pub fn solve_independent(
+        &mut self,
+        interaction: &Interaction,
+        half: &CoarseHalf,
+        cancelled: Cancelled<'_>,
+    ) -> Result<AccurateResult, Stop> {
+        let tool = interaction.tool as usize;
+        let friction = self.setup.coarse.tools[tool].friction;
+        let result = match &half.load {
+            Load::Suction(forces) => self.accurate.loaded(forces, cancelled),
+            Load::Tool(way) => self.accurate.pressed(&self.obstacles[tool], friction, way, cancelled),
+        };
+        accept(result, Reason::IndependentNotConverged, Reason::IndependentInverted)
+    }
+}
+
+fn accept(
+    result: Result<AccurateResult, AccurateFailure>,
+    not_converged: Reason,
+    inverted: Reason,
+) -> Result<AccurateResult, Stop> {
+    match result {
+        Ok(result) if result.solve.smallest_jacobian >= SMALLEST_JACOBIAN => Ok(result),
+        Ok(AccurateResult { solve: SolveInfo { smallest_jacobian, iterations, .. }, .. }) => Err(Stop::Rejected(
+            inverted,
+            format!("smallest J is {smallest_jacobian:.3}, below {SMALLEST_JACOBIAN}, after {iterations} Newton steps"),
+        )),
+        Err(AccurateFailure::Failed(message)) => Err(Stop::Rejected(not_converged, message)),
+        Err(AccurateFailure::Interrupted) => Err(Stop::Interrupted),
+    }
+}
+
+fn rejected(index: u32, interaction: &Interaction, reason: Reason, message: String) -> Outcome {
+    Outcome::Rejected(Rejection::new(index, interaction, reason, message))
+}

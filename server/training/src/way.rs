@@ -1,0 +1,131 @@
+//! The way of a tool to its place: straight lines between poses.
+
+use nalgebra::Isometry3;
+use plica_accurate::contact::Obstacle;
+
+use crate::interaction::{Action, Interaction, from_numbers};
+use crate::obstacle::first_touch;
+use crate::plan::line_of_approach;
+use crate::reference::ReferenceSkin;
+
+/// A turn counts as the path of a point this far from the tool's origin \[m\].
+const LEVER_M: f64 = 0.05;
+/// Where a press starts, above first touch \[m\].
+const CLEARANCE_M: f64 = 1e-3;
+
+/// Poses that a tool visits in straight lines, `world <- tool`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Way {
+    poses: Vec<Isometry3<f64>>,
+    /// Path from the first pose to each \[m\].
+    reached: Vec<f64>,
+}
+
+impl Way {
+    /// From one pose or more.
+    ///
+    /// # Panics
+    /// Without a pose.
+    pub fn new(poses: Vec<Isometry3<f64>>) -> Self {
+        assert!(!poses.is_empty(), "a way has a pose");
+        let mut reached = vec![0.0];
+        for (k, pair) in poses.windows(2).enumerate() {
+            let turn = LEVER_M * pair[0].rotation.angle_to(&pair[1].rotation);
+            reached.push(reached[k] + (pair[1].translation.vector - pair[0].translation.vector).norm().max(turn));
+        }
+        Self { poses, reached }
+    }
+
+    /// The way of `interaction`: from a little above first touch in by the depth, then aside by the drag; or as recorded.
+    /// `None` for a lift, and for a press that touches nothing.
+    pub fn of(interaction: &Interaction, obstacle: &Obstacle, skin: &ReferenceSkin) -> Option<Self> {
+        match &interaction.action {
+            Action::Lift { .. } => None,
+            Action::Follow { poses } => Some(Self::new(poses.iter().map(from_numbers).collect())),
+            Action::Press { depth_m, drag_m, .. } => {
+                let points = skin.skin().positions();
+                let size = extent(skin);
+                let (mut pose, direction) = line_of_approach(interaction, 2.0 * size)?;
+                let contact = [points, &[interaction.contact_point()]].concat();
+                let touch = first_touch(obstacle, &pose, &direction, &contact, 4.0 * size)?;
+                pose.translation.vector += direction * (touch - CLEARANCE_M);
+                let mut pressed = pose;
+                pressed.translation.vector += direction * (CLEARANCE_M + depth_m);
+                let mut dragged = pressed;
+                dragged.translation.vector += nalgebra::Vector3::from(*drag_m);
+                let poses = if dragged == pressed { vec![pose, pressed] } else { vec![pose, pressed, dragged] };
+                Some(Self::new(poses))
+            }
+        }
+    }
+
+    /// Poses between the straight lines.
+    pub fn poses(&self) -> &[Isometry3<f64>] {
+        &self.poses
+    }
+
+    /// Where it ends.
+    pub fn end(&self) -> &Isometry3<f64> {
+        &self.poses[self.poses.len() - 1]
+    }
+
+    /// Length \[m\].
+    pub fn length_m(&self) -> f64 {
+        self.reached[self.reached.len() - 1]
+    }
+
+    /// The pose at a share of the length, 0 to 1.
+    pub fn at(&self, share: f64) -> Isometry3<f64> {
+        let path = share * self.length_m();
+        let next = self.reached.partition_point(|r| *r < path);
+        if next == 0 || next >= self.poses.len() {
+            return self.poses[next.min(self.poses.len() - 1)];
+        }
+        let within = (path - self.reached[next - 1]) / (self.reached[next] - self.reached[next - 1]);
+        let (a, b) = (&self.poses[next - 1], &self.poses[next]);
+        a.try_lerp_slerp(b, within, 1e-12).unwrap_or(*b)
+    }
+
+    /// Poses no farther apart than `step_m`, every corner of the way among them.
+    pub fn steps(&self, step_m: f64) -> Vec<Isometry3<f64>> {
+        let mut steps = vec![self.poses[0]];
+        for (k, pair) in self.poses.windows(2).enumerate() {
+            let n = ((self.reached[k + 1] - self.reached[k]) / step_m).ceil().max(1.0) as usize;
+            let between = |i: usize| pair[0].try_lerp_slerp(&pair[1], i as f64 / n as f64, 1e-12);
+            steps.extend((1..n).filter_map(between));
+            steps.push(pair[1]);
+        }
+        steps
+    }
+}
+
+/// Diagonal of the skin's box \[m\].
+fn extent(skin: &ReferenceSkin) -> f64 {
+    let points = skin.skin().positions();
+    let (low, high) = points.iter().fold((points[0], points[0]), |(l, h), p| (l.inf(p), h.sup(p)));
+    (high - low).norm()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_way_is_walked_at_even_pace_and_rests_at_its_corners() {
+        let at = |x: f64, z: f64| Isometry3::translation(x, 0.0, z);
+        let way = Way::new(vec![at(0.0, 3.0), at(0.0, 0.0), at(1.0, 0.0)]);
+        assert_eq!(way.length_m(), 4.0);
+        assert!((way.at(0.25).translation.vector.z - 2.0).abs() < 1e-12);
+        assert!((way.at(0.875).translation.vector.x - 0.5).abs() < 1e-12);
+        assert_eq!((way.at(0.0), way.at(1.0)), (at(0.0, 3.0), at(1.0, 0.0)));
+        let steps = way.steps(2.0);
+        assert_eq!(steps.len(), 4);
+        assert!(steps.contains(&at(0.0, 0.0)) && steps.contains(&at(0.0, 1.5)));
+    }
+
+    #[test]
+    fn a_single_pose_is_a_way_too() {
+        let way = Way::new(vec![Isometry3::identity()]);
+        assert_eq!((way.length_m(), way.at(0.5)), (0.0, Isometry3::identity()));
+    }
+}
