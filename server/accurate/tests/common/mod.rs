@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 pub mod derivatives;
+pub mod manufactured;
 pub mod random;
 
 use std::ops::ControlFlow;
