@@ -6,7 +6,8 @@ use std::fs;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use plica_protocol::jobs::{JobFile, JobKind, JobState};
+use plica_protocol::jobs::{JobFile, JobState};
+use plica_training::{Job, Progress};
 use serde::{Deserialize, Serialize};
 
 use super::files::{read_json, to_json, write_atomically};
@@ -15,27 +16,6 @@ use super::files::{read_json, to_json, write_atomically};
 const TAIL_BYTES: u64 = 4096;
 /// Longest last line that is repeated to clients, in characters.
 const LINE_CHARS: usize = 400;
-
-/// `job.json`: what was asked; written once.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Order {
-    /// Name of the folder.
-    pub id: String,
-    /// Chosen by the client.
-    pub client_id: String,
-    /// What to make.
-    pub kind: JobKind,
-    /// Name of the scene, for people.
-    pub scene_name: String,
-    /// How many examples; null: what the scene says.
-    pub examples: Option<u32>,
-    /// Seed of the interactions; null: what the scene says.
-    pub seed: Option<u64>,
-    /// Threads.
-    pub threads: u32,
-    /// Seconds since 1970.
-    pub submitted_unix_s: u64,
-}
 
 /// `state.json`: where the job stands.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -57,22 +37,6 @@ impl Standing {
     pub fn queued() -> Self {
         Self { state: JobState::Queued, reason: None, started_unix_s: None, finished_unix_s: None, pid: None }
     }
-}
-
-/// `progress.json`: what the process says of itself after each example.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Report {
-    /// What it does.
-    pub stage: Option<String>,
-    /// Finished examples.
-    pub done: u32,
-    /// Rejected ones.
-    pub rejected: u32,
-    /// All.
-    pub total: u32,
-    /// Estimate \[s\].
-    pub seconds_left: Option<f64>,
 }
 
 /// A job's folder.
@@ -109,13 +73,13 @@ impl JobFolder {
     }
 
     /// Reads `job.json`; the error is a sentence.
-    pub fn order(&self) -> Result<Order, String> {
+    pub fn job(&self) -> Result<Job, String> {
         read_json(&self.0.join("job.json"))
     }
 
     /// Writes `job.json`.
-    pub fn write_order(&self, order: &Order) -> io::Result<()> {
-        write_atomically(&self.0.join("job.json"), &to_json(order))
+    pub fn write_job(&self, job: &Job) -> io::Result<()> {
+        write_atomically(&self.0.join("job.json"), &to_json(job))
     }
 
     /// Reads `state.json`; the error is a sentence.
@@ -129,8 +93,14 @@ impl JobFolder {
     }
 
     /// Reads `progress.json`; `None` before there is one.
-    pub fn report(&self) -> Option<Report> {
+    pub fn progress(&self) -> Option<Progress> {
         read_json(&self.0.join("progress.json")).ok()
+    }
+
+    /// Whether a process works in it, one started by hand or one that is still ending: it holds a lock.
+    pub fn is_busy(&self) -> bool {
+        let lock = fs::File::open(self.0.join(".lock"));
+        lock.is_ok_and(|lock| matches!(lock.try_lock(), Err(fs::TryLockError::WouldBlock)))
     }
 
     /// The last line of the log that says something.
@@ -174,10 +144,22 @@ mod tests {
         let keys: Vec<_> = json.as_object().unwrap().keys().map(String::as_str).collect();
         assert_eq!(keys, ["finished_unix_s", "pid", "reason", "started_unix_s", "state"]);
         assert_eq!(job.standing().unwrap(), Standing::queued());
-        fs::write(folder.path().join("progress.json"), r#"{"stage": "examples", "done": 3, "total": 8}"#).unwrap();
-        let report = job.report().unwrap();
-        assert_eq!((report.done, report.rejected, report.total), (3, 0, 8));
-        assert!(job.order().unwrap_err().contains("job.json cannot be read"));
+        let progress = r#"{"stage": "examples", "done": 3, "rejected": 1, "total": 8, "seconds_left": null}"#;
+        fs::write(folder.path().join("progress.json"), progress).unwrap();
+        let progress = job.progress().unwrap();
+        assert_eq!((progress.done, progress.rejected, progress.total), (3, 1, 8));
+        assert!(job.job().unwrap_err().contains("job.json cannot be read"));
         assert_eq!(job.last_words(), None);
+    }
+
+    #[test]
+    fn a_folder_is_busy_while_a_process_holds_its_lock() {
+        let folder = tempfile::tempdir().unwrap();
+        let job = JobFolder::new(folder.path().to_owned());
+        assert!(!job.is_busy());
+        let held = plica_training::Folder::open(folder.path()).unwrap();
+        assert!(job.is_busy());
+        drop(held);
+        assert!(!job.is_busy());
     }
 }

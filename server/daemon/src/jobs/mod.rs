@@ -30,7 +30,7 @@ use plica_protocol::rpc::ErrorReply;
 
 pub use data_folder::{DataFolder, DataFolderError, default_path};
 pub use error::JobError;
-pub use folder::{JobFolder, Order, Report, Standing};
+pub use folder::{JobFolder, Standing};
 pub use priority::{Priority, lower};
 pub use process::Launch;
 pub use reason::INTERRUPTED;

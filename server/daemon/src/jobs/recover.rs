@@ -32,7 +32,7 @@ pub(super) fn recover(jobs: &Path) -> std::io::Result<Store> {
 
 fn read(path: &Path) -> Result<Found, String> {
     let folder = JobFolder::new(path.to_owned());
-    let order = folder.order()?;
+    let order = folder.job()?;
     if path.file_name().is_none_or(|name| name != order.id.as_str()) {
         return Err(format!("its job.json says that it is job {}", order.id));
     }
@@ -42,8 +42,8 @@ fn read(path: &Path) -> Result<Found, String> {
     }
     let standing = written.clone().map_or_else(|_| Standing::queued(), resumed);
     let changed = written.ok().as_ref() != Some(&standing);
-    let report = folder.report().unwrap_or_default();
-    Ok(Found { entry: Entry { folder, order, standing, report }, changed })
+    let progress = folder.progress();
+    Ok(Found { entry: Entry { folder, order, standing, progress }, changed })
 }
 
 fn resumed(standing: Standing) -> Standing {

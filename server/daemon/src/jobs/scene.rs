@@ -1,4 +1,4 @@
-//! The scene of a job: text, and the mesh files that it names, checked before the job is taken.
+//! The scene of a job: text, and the files that it names (meshes, recorded motions), checked before the job is taken.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};
@@ -9,8 +9,8 @@ use super::JobError;
 use super::files::write_and_sync;
 use crate::config::Config;
 
-/// Largest mesh file that a job takes along.
-const MAX_MESH_BYTES: u64 = 64 << 20;
+/// Largest file that a job takes along.
+const MAX_FILE_BYTES: u64 = 64 << 20;
 
 /// What a job's folder holds already.
 const OWN_NAMES: [&str; 8] = [
@@ -29,7 +29,7 @@ const OWN_NAMES: [&str; 8] = [
 pub struct ServedScene {
     /// Its name.
     pub name: String,
-    /// The folder that mesh files are taken from; none for the built-in scene.
+    /// The folder that the files it names are taken from; none for the built-in scene.
     pub folder: Option<PathBuf>,
     /// Its text.
     pub text: String,
@@ -40,8 +40,8 @@ pub struct ServedScene {
 pub(super) struct JobScene {
     pub(super) name: String,
     text: String,
-    /// Mesh files: path below the scene's folder, and content.
-    meshes: Vec<(PathBuf, Vec<u8>)>,
+    /// Path below the scene's folder, and content.
+    files: Vec<(PathBuf, Vec<u8>)>,
 }
 
 impl JobScene {
@@ -52,15 +52,15 @@ impl JobScene {
             Some(text) => (request.scene_name.as_deref().unwrap_or("scene"), text),
             None => (served.name.as_str(), &served.text),
         };
-        let meshes = take_meshes(text, folder, request.scene.is_none())?;
+        let files = take_files(text, folder, request.scene.is_none())?;
         check(name, text, folder)?;
-        Ok(Self { name: name.to_owned(), text: text.clone(), meshes })
+        Ok(Self { name: name.to_owned(), text: text.clone(), files })
     }
 
-    /// Writes `scene.toml` and the mesh files into a job's folder.
+    /// Writes `scene.toml` and what it names into a job's folder.
     pub(super) fn write(&self, folder: &Path) -> std::io::Result<()> {
         write_and_sync(&folder.join("scene.toml"), self.text.as_bytes())?;
-        for (path, bytes) in &self.meshes {
+        for (path, bytes) in &self.files {
             let path = folder.join(path);
             fs::create_dir_all(path.parent().unwrap_or(folder))?;
             write_and_sync(&path, bytes)?;
@@ -84,13 +84,13 @@ fn check(name: &str, text: &str, folder: Option<&Path>) -> Result<(), JobError> 
 /// Reads the files that a scene names, before anything else does: they are small, ordinary, and where they may be.
 ///
 /// The daemon's own scene may name others by absolute paths; they stay where they are.
-fn take_meshes(text: &str, folder: Option<&Path>, own: bool) -> Result<Vec<(PathBuf, Vec<u8>)>, JobError> {
+fn take_files(text: &str, folder: Option<&Path>, own: bool) -> Result<Vec<(PathBuf, Vec<u8>)>, JobError> {
     // Text that is no TOML is refused a moment later, with the line.
     let Ok(table) = text.parse::<toml::Table>() else { return Ok(Vec::new()) };
     let mut names = Vec::new();
     list_files(&table, &mut names);
     let wanted = names.into_iter().filter(|name| !(own && Path::new(name).is_absolute()));
-    wanted.map(|name| read_mesh(&name, folder).map(|bytes| (PathBuf::from(name), bytes))).collect()
+    wanted.map(|name| read_file(&name, folder).map(|bytes| (PathBuf::from(name), bytes))).collect()
 }
 
 /// Values of all keys called `file`.
@@ -111,16 +111,16 @@ fn list_in(value: &toml::Value, names: &mut Vec<String>) {
     }
 }
 
-fn read_mesh(name: &str, folder: Option<&Path>) -> Result<Vec<u8>, JobError> {
+fn read_file(name: &str, folder: Option<&Path>) -> Result<Vec<u8>, JobError> {
     let refuse = |why: &str| Err(JobError::Scene(format!("file = \"{name}\": {why}")));
     if !is_plain(name) {
-        return refuse("the mesh files of a job lie beside the served scene or below it");
+        return refuse("the files of a job's scene lie beside the served scene or below it");
     }
     let Some(folder) = folder else { return refuse("the built-in scene is served, and there are no files beside it") };
     let path = folder.join(name);
     match fs::metadata(&path) {
         Ok(file) if !file.is_file() => refuse("it is no ordinary file"),
-        Ok(file) if file.len() > MAX_MESH_BYTES => refuse("it is larger than 64 MiB"),
+        Ok(file) if file.len() > MAX_FILE_BYTES => refuse("it is larger than 64 MiB"),
         Ok(_) => fs::read(&path).or_else(|e| refuse(&format!("it cannot be read: {e}"))),
         Err(e) => refuse(&format!("it cannot be read beside the served scene: {e}")),
     }
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn mesh_files_come_along() {
+    fn files_come_along() {
         let (folder, job) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let served = served(folder.path());
         let scene = JobScene::new(&JobSubmitRequest::new("a", JobKind::Training), &served).unwrap();

@@ -7,10 +7,12 @@ use std::io;
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use plica_protocol::jobs::{Job, JobListReply, JobState, MAX_LISTED, Progress};
+use plica_protocol::jobs::{Job, JobListReply, JobState, MAX_LISTED};
+use plica_training::{Job as Order, Progress};
 
 use super::JobError;
-use super::folder::{JobFolder, Order, Report, Standing};
+use super::folder::{JobFolder, Standing};
+use crate::wire;
 
 /// One job.
 #[derive(Debug, Clone)]
@@ -18,7 +20,8 @@ pub(super) struct Entry {
     pub(super) folder: JobFolder,
     pub(super) order: Order,
     pub(super) standing: Standing,
-    pub(super) report: Report,
+    /// What the process has said of itself.
+    pub(super) progress: Option<Progress>,
 }
 
 /// A job of an earlier daemon.
@@ -105,10 +108,11 @@ impl Store {
         self.lock().rows.get(&number).map(|row| row.entry.standing.state)
     }
 
-    /// The next in the queue.
-    pub(super) fn next_queued(&self) -> Option<u32> {
-        let queued = |row: &Row| row.entry.standing.state == JobState::Queued;
-        self.lock().rows.iter().find(|(_, row)| queued(row)).map(|(number, _)| *number)
+    /// The queue.
+    pub(super) fn queued(&self) -> Vec<(u32, JobFolder)> {
+        let table = self.lock();
+        let queued = table.rows.iter().filter(|(_, row)| row.entry.standing.state == JobState::Queued);
+        queued.map(|(number, row)| (*number, row.entry.folder.clone())).collect()
     }
 
     /// How many jobs are not over.
@@ -152,13 +156,13 @@ impl Store {
     }
 
     /// What a job's process says of itself.
-    pub(super) fn report(&self, number: u32, report: Report) {
+    pub(super) fn tell(&self, number: u32, progress: Progress) {
         let mut table = self.lock();
         let version = table.version + 1;
-        let Some(row) = table.rows.get_mut(&number).filter(|row| row.entry.report != report) else { return };
+        let Some(row) = table.rows.get_mut(&number).filter(|row| row.entry.progress != Some(progress)) else { return };
         // Nothing to save: the process has written it.
         let was_saved = row.saved == row.version;
-        row.entry.report = report;
+        row.entry.progress = Some(progress);
         row.version = version;
         row.saved = if was_saved { version } else { row.saved };
         table.version = version;
@@ -195,26 +199,6 @@ impl Store {
 impl Entry {
     /// The job as clients see it.
     pub(super) fn job(&self) -> Job {
-        let (order, standing, report) = (self.order.clone(), self.standing.clone(), self.report.clone());
-        Job {
-            id: order.id,
-            client_id: order.client_id,
-            kind: order.kind,
-            scene_name: order.scene_name,
-            examples: order.examples,
-            seed: order.seed,
-            threads: order.threads,
-            submitted_unix_s: order.submitted_unix_s,
-            state: standing.state,
-            reason: standing.reason,
-            started_unix_s: standing.started_unix_s,
-            finished_unix_s: standing.finished_unix_s,
-            progress: progress(report),
-        }
+        wire::job(&self.order, &self.standing, self.progress)
     }
-}
-
-fn progress(report: Report) -> Progress {
-    let Report { stage, done, rejected, total, seconds_left } = report;
-    Progress { stage, done, rejected, total, seconds_left }
 }

@@ -6,13 +6,15 @@ use std::num::NonZero;
 use std::path::Path;
 
 use plica_protocol::jobs::{JobSubmitReply, JobSubmitRequest};
+use plica_training::Job as Order;
 
 use super::files::sync_folder;
-use super::folder::{JobFolder, Order, Report, Standing};
+use super::folder::{JobFolder, Standing};
 use super::recover::SUBMITTING;
 use super::scene::{JobScene, ServedScene};
 use super::store::{Entry, Store};
 use super::{JobError, now_unix_s};
+use crate::wire;
 
 /// Jobs that may wait.
 const MAX_UNFINISHED: usize = 100;
@@ -37,7 +39,7 @@ pub(super) fn submit(
     let standing = Standing::queued();
     make(store.jobs(), &folder, &scene, &order, &standing)
         .map_err(|e| JobError::Disk(format!("{}: {e}", folder.path().display())))?;
-    let entry = Entry { folder, order, standing, report: Report::default() };
+    let entry = Entry { folder, order, standing, progress: None };
     Ok(JobSubmitReply { created: true, job: store.insert(number, entry) })
 }
 
@@ -46,10 +48,10 @@ fn same(entry: &Entry, request: &JobSubmitRequest) -> Result<(), JobError> {
     let order = &entry.order;
     let scene = request.scene.as_ref().map(|text| fs::read(entry.folder.scene()).is_ok_and(|t| t == text.as_bytes()));
     let differs = [
-        ("kind", order.kind != request.kind),
+        ("kind", order.kind != wire::job_kind(request.kind)),
         ("examples", order.examples != request.examples),
         ("seed", order.seed != request.seed),
-        ("threads", request.threads.is_some_and(|threads| threads != order.threads)),
+        ("threads", request.threads.is_some() && request.threads != order.threads),
         ("scene", scene == Some(false)),
     ];
     match differs.iter().find(|(_, differs)| *differs) {
@@ -62,19 +64,19 @@ fn order(request: &JobSubmitRequest, scene: &JobScene, id: String) -> Order {
     Order {
         id,
         client_id: request.client_id.clone(),
-        kind: request.kind,
+        kind: wire::job_kind(request.kind),
         scene_name: scene.name.clone(),
         examples: request.examples,
         seed: request.seed,
-        threads: request.threads.unwrap_or_else(default_threads),
+        threads: request.threads.or_else(default_threads),
         submitted_unix_s: now_unix_s(),
     }
 }
 
 /// All cores but one, which the simulation needs.
-fn default_threads() -> u32 {
+fn default_threads() -> Option<u32> {
     let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
-    u32::try_from(cores.saturating_sub(1).max(1)).unwrap_or(1)
+    u32::try_from(cores.saturating_sub(1).max(1)).ok()
 }
 
 /// Makes the folder beside its place and moves it there: it is complete, or not there.
@@ -95,5 +97,5 @@ fn fill(folder: &JobFolder, scene: &JobScene, order: &Order, standing: &Standing
     fs::create_dir(folder.path())?;
     scene.write(folder.path())?;
     folder.write_standing(standing)?;
-    folder.write_order(order)
+    folder.write_job(order)
 }

@@ -60,9 +60,9 @@ impl Supervisor {
         if self.running.is_some() {
             self.watch();
         }
-        let is_free = self.running.is_none() && !self.stopping();
-        if let Some(number) = self.store.next_queued().filter(|_| is_free) {
-            self.start(number);
+        if self.running.is_none() && !self.stopping() {
+            let next = self.store.queued().into_iter().find(|(_, folder)| !folder.is_busy());
+            next.into_iter().for_each(|(number, _)| self.start(number));
         }
     }
 
@@ -104,8 +104,8 @@ impl Supervisor {
         let Some((number, process)) = &mut self.running else { return };
         let number = *number;
         let ended = process.ended();
-        if let Some(report) = self.store.entry(number).and_then(|entry| entry.folder.report()) {
-            self.store.report(number, report);
+        if let Some(progress) = self.store.entry(number).and_then(|entry| entry.folder.progress()) {
+            self.store.tell(number, progress);
         }
         match ended {
             Ok(None) if stopping || process.was_asked() || self.store.state(number) != Some(JobState::Running) => {

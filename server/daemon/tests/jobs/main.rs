@@ -182,6 +182,21 @@ fn a_job_resumed_at_once_after_it_was_cancelled_waits_for_its_old_process() {
     assert_eq!(fs::read_to_string(workplace.in_job(&id, "runs")).unwrap(), "begin\nend\nbegin\n");
 }
 
+#[test]
+fn a_folder_in_which_somebody_works_has_to_wait() {
+    let workplace = Workplace::new("while [ ! -e $dir/go ]; do sleep 0.02; done; finish");
+    let daemon = workplace.open();
+    let [first, busy, last] = ["a", "b", "c"].map(|client_id| daemon.submit(client_id).id);
+    let held = plica_training::Folder::open(&workplace.path("jobs").join(&busy)).unwrap();
+    for id in [&first, &busy, &last] {
+        fs::write(workplace.in_job(id, "go"), "").unwrap();
+    }
+    daemon.wait_for(&last, JobState::Done);
+    assert_eq!((daemon.get(&first).state, daemon.get(&busy).state), (JobState::Done, JobState::Queued));
+    drop(held);
+    daemon.wait_for(&busy, JobState::Done);
+}
+
 const COUNTS_TO_FIVE: &str = "trap 'exit 75' TERM
     n=$(ls $dir/examples 2>/dev/null | wc -l); mkdir -p $dir/examples; echo $n >>$dir/starts
     while [ $n -lt 5 ]; do
