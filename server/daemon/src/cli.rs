@@ -37,6 +37,8 @@ pub enum Command {
     Bench(BenchArgs),
     /// Says what a scene will cost, and whether it can be served.
     Check(CheckArgs),
+    /// Makes examples of a scene: the tool interacts, both models settle, what the coarse one misses is kept.
+    Train(TrainArgs),
     /// Prints the JSON Schema of scene files.
     Schema,
     /// Becomes the process of a job.
@@ -151,6 +153,49 @@ pub enum Element {
     EnhancedStrain,
     /// Trilinear with 2x2x2 points.
     FullIntegration,
+}
+
+/// `plicad train`.
+#[derive(Debug, Args)]
+pub struct TrainArgs {
+    /// Scene file, or `wedge` for the built-in one.
+    #[arg(required_unless_present = "job")]
+    pub scene: Option<PathBuf>,
+    /// Runs the job of an existing folder, or goes on with it.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["scene", "out", "folder", "kind", "examples", "seed", "sensitivity"])]
+    pub job: Option<PathBuf>,
+    /// Copies the finished database here.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Folder of the job; the same folder goes on where it was [default: out/train/SCENE-KIND].
+    #[arg(long, value_name = "DIR")]
+    pub folder: Option<PathBuf>,
+    /// What the examples are for.
+    #[arg(long, default_value = "training")]
+    pub kind: TrainKind,
+    /// How many; of an evaluation: in the trained region [default: what the scene says].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub examples: Option<u32>,
+    /// Seed of the interactions [default: what the scene says].
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Threads [default: all cores but one].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub threads: Option<u32>,
+    /// Trains nothing: tabulates over so many interactions how firm the accurate skin is against mesh, tie and reference.
+    #[arg(long, value_name = "N", conflicts_with_all = ["out", "folder", "kind", "examples", "seed"],
+          value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub sensitivity: Option<u32>,
+}
+
+/// What examples are for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "snake_case")]
+pub enum TrainKind {
+    /// To learn from.
+    Training,
+    /// Held out, in the trained region and outside of it, with both references.
+    Evaluation,
 }
 
 /// `plicad check`.

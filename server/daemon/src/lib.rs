@@ -20,4 +20,5 @@ pub mod roofline;
 pub mod scene;
 pub mod server;
 pub mod surface;
+pub mod training;
 pub mod wire;

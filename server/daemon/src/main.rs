@@ -19,8 +19,16 @@ fn main() -> ExitCode {
             if cli.json {
                 print_error(&message);
             }
-            ExitCode::FAILURE
+            exit_code(&error)
         }
+    }
+}
+
+/// A job that was asked to stop is not one that failed.
+fn exit_code(error: &anyhow::Error) -> ExitCode {
+    match error.downcast_ref() {
+        Some(plica_training::TrainingError::Interrupted) => ExitCode::from(plicad::commands::train::INTERRUPTED),
+        _ => ExitCode::FAILURE,
     }
 }
 

@@ -3,8 +3,9 @@
 use nalgebra::{Point3, Vector3};
 use plica_geometry::{Embedding, EmbeddingError, HexIdx, HexMesh, Skin, shapes};
 use plica_sim::{Material, Model, ModelDescription, ModelError};
+use plica_training::AccurateDescription;
 
-use crate::config::{Config, Face, FixedConfig, MeshConfig, ObjectConfig};
+use crate::config::{Config, Face, FixedConfig, MeshConfig, ObjectConfig, Region};
 
 /// A node closer to a face than this share of the object's size lies on it.
 const ON_FACE: f64 = 1e-6;
@@ -80,28 +81,56 @@ pub fn describe(config: &Config) -> Result<ModelDescription, SceneError> {
     })
 }
 
+/// The accurate model of a scene, with its own divisions or with others.
+///
+/// # Errors
+/// [`SceneError::EmptySupport`].
+pub fn describe_accurate(config: &Config, divisions: Option<[usize; 3]>) -> Result<AccurateDescription, SceneError> {
+    let (object, accurate) = (config.object(), config.object().accurate());
+    let mesh = generate_mesh(object, divisions.unwrap_or(accurate.divisions));
+    let regions: Vec<_> = mesh.hex_indices().map(|hex| region_of(object, &mesh, hex)).collect();
+    let material = |region: &Option<&Region>| region.map_or(accurate.material, |r| accurate.material_in(r));
+    let density = |region: &Option<&Region>| region.map_or(object.material(), |r| r.material).density_kg_per_m3;
+    Ok(AccurateDescription {
+        fixed: fixed_nodes(config, &mesh)?,
+        materials: regions.iter().map(material).collect(),
+        densities_kg_per_m3: regions.iter().map(density).collect(),
+        mesh,
+    })
+}
+
 /// The skin of a scene's object.
 pub fn skin(config: &Config) -> Skin {
     generate(config.object()).1
 }
 
 fn generate(object: &ObjectConfig) -> (HexMesh, Skin) {
-    let (divisions, spacing) = (object.divisions(), object.skin().spacing_m);
+    let spacing = object.skin().spacing_m;
+    let skin = match object.mesh() {
+        MeshConfig::Wedge(wedge) => shapes::wedge_skin(wedge, spacing),
+        MeshConfig::Block(size) => shapes::block_skin(*size, spacing),
+    };
+    (generate_mesh(object, object.divisions()), skin)
+}
+
+fn generate_mesh(object: &ObjectConfig, divisions: [usize; 3]) -> HexMesh {
     match object.mesh() {
-        MeshConfig::Wedge(wedge) => (shapes::wedge(wedge, divisions), shapes::wedge_skin(wedge, spacing)),
-        MeshConfig::Block(size) => (shapes::block(*size, divisions), shapes::block_skin(*size, spacing)),
+        MeshConfig::Wedge(wedge) => shapes::wedge(wedge, divisions),
+        MeshConfig::Block(size) => shapes::block(*size, divisions),
     }
 }
 
-/// Material of each hexahedron: the last region that holds its centre, else the object's.
+/// Material of each hexahedron.
 fn materials(object: &ObjectConfig, mesh: &HexMesh) -> Vec<Material> {
-    let material = |hex: HexIdx| {
-        let corners = mesh.corner_positions(hex);
-        let centre = Point3::from(corners.iter().map(|c| c.coords).sum::<Vector3<f64>>() / 8.0);
-        let region = object.regions().iter().rev().find(|r| inside(&centre, &r.corners));
-        region.map_or(object.material(), |r| r.material)
-    };
+    let material = |hex| region_of(object, mesh, hex).map_or(object.material(), |r| r.material);
     mesh.hex_indices().map(material).collect()
+}
+
+/// The last region that holds a hexahedron's centre.
+fn region_of<'a>(object: &'a ObjectConfig, mesh: &HexMesh, hex: HexIdx) -> Option<&'a Region> {
+    let corners = mesh.corner_positions(hex);
+    let centre = Point3::from(corners.iter().map(|c| c.coords).sum::<Vector3<f64>>() / 8.0);
+    object.regions().iter().rev().find(|r| inside(&centre, &r.corners))
 }
 
 fn fixed_nodes(config: &Config, mesh: &HexMesh) -> Result<Vec<bool>, SceneError> {
@@ -181,6 +210,24 @@ mod tests {
         let hard = description.materials.iter().filter(|m| m.young_modulus_pa == 1e6).count();
         assert_eq!(hard, 64);
         assert_eq!(description.materials[0].poisson_ratio, 0.45);
+    }
+
+    #[test]
+    fn the_accurate_model_takes_what_it_is_given_and_the_rest_from_the_object() {
+        let region = "[[objects.wedge.regions]]\nname = \"core\"\nmin_m = [0, 0, 0]\nmax_m = [0.06, 1, 1]\nyoung_modulus_pa = 1e6\n\n[objects.wedge.supports]";
+        let text = BUILT_IN_SCENE.replacen("[objects.wedge.supports]", region, 1);
+        let config = Config::parse(Path::new("scene.toml"), &text).unwrap();
+        let accurate = describe_accurate(&config, None).unwrap();
+        assert_eq!(accurate.mesh.n_hexes(), 4096);
+        let hard = accurate.materials.iter().filter(|m| m.young_modulus_pa == 1e6);
+        assert!(hard.clone().all(|m| m.poisson_ratio == 0.48), "the region does not say, so the accurate model does");
+        assert_eq!(hard.count(), 2048);
+        assert_eq!(accurate.fixed.iter().filter(|f| **f).count(), 33 * 17);
+        let text = text.replacen("young_modulus_pa = 1e6", "poisson_ratio = 0.1", 1);
+        let config = Config::parse(Path::new("scene.toml"), &text).unwrap();
+        let accurate = describe_accurate(&config, Some([4, 2, 2])).unwrap();
+        assert_eq!(accurate.materials.iter().filter(|m| m.poisson_ratio == 0.1).count(), 8);
+        assert!(accurate.materials.iter().all(|m| m.young_modulus_pa == 3e4));
     }
 
     #[test]

@@ -7,6 +7,7 @@ pub mod demo;
 pub mod schema;
 pub mod serve;
 pub mod simulate;
+pub mod train;
 
 use std::path::Path;
 
@@ -21,6 +22,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Simulate(args) => simulate::run(args, cli.json),
         Command::Bench(args) => bench::run(args, cli.json),
         Command::Check(args) => check::run(args, cli.json),
+        Command::Train(args) => train::run(args, cli.json),
         Command::Schema => schema::run(cli.json),
         Command::Child(args) => child::run(args),
     }

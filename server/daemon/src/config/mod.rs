@@ -1,25 +1,31 @@
 //! Scene files: [`RawConfig`] is what was typed, [`Config`] is what is meant. Parsed and checked once; nothing checks again.
 
+mod accurate;
 mod bench;
 mod checks;
 mod document;
 mod error;
+mod files;
 mod obj;
 mod object;
 mod raw;
 mod runtime;
 mod tool;
+mod training;
 
 use std::path::{Path, PathBuf};
 
 use plica_sim::{ContactOptions, Plane, SleepOptions, ToolDescription};
 
+pub use accurate::AccurateConfig;
 pub use bench::{BenchConfig, Keyframe};
 pub use document::Document;
 pub use error::ConfigError;
+pub use files::SceneFile;
 pub use object::{Face, FixedConfig, MeshConfig, ObjectConfig, PositionFormat, PublishConfig, Region, SkinConfig};
 pub use raw::RawConfig;
 pub use runtime::RuntimeConfig;
+pub use training::{OutsideConfig, RecordedConfig, TrainingConfig};
 
 use checks::Check;
 
@@ -36,6 +42,9 @@ pub struct Config {
     contact: ContactOptions,
     runtime: RuntimeConfig,
     bench: Option<BenchConfig>,
+    training: TrainingConfig,
+    files: Vec<SceneFile>,
+    text: String,
 }
 
 impl Config {
@@ -70,6 +79,9 @@ impl Config {
             object,
             contact: runtime::check_contact(&check, &raw.contact)?,
             runtime: runtime::check(&check, &raw.runtime)?,
+            training: check_training(&check, &raw, &tools)?,
+            files: files::list(&check, &raw),
+            text: text.to_owned(),
             tools,
             bench,
         })
@@ -120,6 +132,21 @@ impl Config {
         self.bench.as_ref()
     }
 
+    /// What `plicad train` does.
+    pub fn training(&self) -> &TrainingConfig {
+        &self.training
+    }
+
+    /// Files that the scene names.
+    pub fn files(&self) -> &[SceneFile] {
+        &self.files
+    }
+
+    /// The scene file's text.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
     /// Immovable half-spaces.
     pub fn planes(&self) -> &[Plane] {
         self.object.planes()
@@ -129,6 +156,11 @@ impl Config {
     pub fn sleep(&self) -> &SleepOptions {
         self.runtime.sleep()
     }
+}
+
+fn check_training(c: &Check<'_>, raw: &RawConfig, tools: &[ToolDescription]) -> Result<TrainingConfig, ConfigError> {
+    let (name, object) = raw.objects.first_key_value().expect("the object was checked before");
+    training::check(c, &format!("objects.{name}.training"), &object.training, tools)
 }
 
 #[cfg(test)]

@@ -3,11 +3,13 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
+use plica_accurate::TieOptions;
 use plica_geometry::EmbeddingKind;
 use plica_geometry::shapes::Wedge;
 use plica_sim::{ElementKind, Material, Plane, Preconditioner, SolverOptions};
 
 use super::ConfigError;
+use super::accurate::{self, AccurateConfig};
 use super::checks::Check;
 use super::raw::{
     RawCoarse, RawElement, RawEmbedding, RawFace, RawFormat, RawGenerator, RawMaterial, RawMesh, RawObject,
@@ -35,6 +37,8 @@ pub struct ObjectConfig {
     solver: SolverOptions,
     skin: SkinConfig,
     publish: PublishConfig,
+    accurate: AccurateConfig,
+    tie: TieOptions,
 }
 
 /// Shape of an object.
@@ -55,6 +59,10 @@ pub struct Region {
     pub corners: [Point3<f64>; 2],
     /// Material of hexahedra whose centre lies inside.
     pub material: Material,
+    /// Whether the region itself says its Young's modulus, and does not leave it to the object.
+    pub gives_young_modulus: bool,
+    /// The same of Poisson's ratio.
+    pub gives_poisson_ratio: bool,
 }
 
 /// Which coarse nodes are held.
@@ -162,6 +170,14 @@ impl ObjectConfig {
     pub fn publish(&self) -> PublishConfig {
         self.publish
     }
+    /// Quasi-static model that examples are made with.
+    pub fn accurate(&self) -> &AccurateConfig {
+        &self.accurate
+    }
+    /// How the accurate skin is tied to the coarse imprint.
+    pub fn tie(&self) -> TieOptions {
+        self.tie
+    }
 }
 
 /// The one object of a scene.
@@ -179,6 +195,7 @@ pub(super) fn check(c: &Check<'_>, objects: &BTreeMap<String, RawObject>) -> Res
     let divisions = check_divisions(c, &format!("{key}.coarse.divisions"), raw.coarse.divisions)?;
     let material = check_material(c, &format!("{key}.material"), &raw.material)?;
     let (fixed, planes) = check_supports(c, &format!("{key}.supports"), &raw.supports)?;
+    let accurate = accurate::check(c, &format!("{key}.accurate"), &raw.accurate, (divisions, material))?;
     let damping_key = format!("{key}.material.mass_damping_per_s");
     Ok(ObjectConfig {
         name: name.to_owned(),
@@ -197,6 +214,8 @@ pub(super) fn check(c: &Check<'_>, objects: &BTreeMap<String, RawObject>) -> Res
         substeps: c.count(&format!("{key}.coarse.substeps"), raw.coarse.substeps, 1, 16)?,
         solver: check_solver(c, &format!("{key}.coarse.solver"), &raw.coarse)?,
         publish: check_publish(c, &format!("{key}.publish"), &raw.publish)?,
+        tie: accurate::check_tie(c, &format!("{key}.tie"), &raw.tie, accurate.material.young_modulus_pa)?,
+        accurate,
     })
 }
 
@@ -265,6 +284,8 @@ fn check_regions(c: &Check<'_>, key: &str, raw: &[RawRegion], base: Material) ->
             name: r.name.clone(),
             corners: c.corners(&key, r.min_m, r.max_m)?,
             material: check_material(c, &key, &material)?,
+            gives_young_modulus: r.young_modulus_pa.is_some(),
+            gives_poisson_ratio: r.poisson_ratio.is_some(),
         })
     };
     raw.iter().enumerate().map(region).collect()

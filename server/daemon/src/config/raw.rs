@@ -2,10 +2,14 @@
 
 #![allow(rustdoc::broken_intra_doc_links, reason = "units in brackets; the schema shows this text as it is")]
 
+mod training;
+
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
+
+pub(crate) use training::*;
 
 /// A scene: one soft object, the tools that touch it, and how it runs.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -50,6 +54,15 @@ pub struct RawObject {
     /// What is sent, and how often.
     #[serde(default)]
     pub publish: RawPublish,
+    /// Quasi-static model that examples are made with.
+    #[serde(default)]
+    pub accurate: RawAccurate,
+    /// How the accurate skin is tied to the coarse imprint.
+    #[serde(default)]
+    pub tie: RawTie,
+    /// What `plicad train` does.
+    #[serde(default)]
+    pub training: RawTraining,
 }
 
 /// Shape of an object, made by a generator.

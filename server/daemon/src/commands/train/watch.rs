@@ -1,0 +1,111 @@
+//! Who hears how a job goes: a bar on the terminal, or lines of a log. Both stop it at SIGTERM and Ctrl-C.
+
+use std::sync::Arc;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::time::{Duration, Instant};
+
+use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
+use plica_training::{Progress, Report, Stage, Watch};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+
+/// At least this long between two lines of a log.
+const LOG_INTERVAL: Duration = Duration::from_secs(30);
+
+/// Set once somebody asks the process to end.
+#[derive(Debug, Clone)]
+pub(super) struct Ending(Arc<AtomicBool>);
+
+impl Ending {
+    pub(super) fn listen() -> std::io::Result<Self> {
+        let asked = Arc::new(AtomicBool::new(false));
+        for signal in [SIGTERM, SIGINT, SIGHUP] {
+            signal_hook::flag::register(signal, Arc::clone(&asked))?;
+        }
+        Ok(Self(asked))
+    }
+
+    pub(super) fn is_asked(&self) -> bool {
+        self.0.load(Relaxed)
+    }
+}
+
+/// A progress bar.
+#[derive(Debug)]
+pub(super) struct OnTerminal {
+    ending: Ending,
+    bar: ProgressBar,
+}
+
+impl OnTerminal {
+    pub(super) fn new(ending: Ending) -> Self {
+        let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {msg}").expect("the template is fixed");
+        let bar = ProgressBar::new(1).with_style(style).with_message("builds the models");
+        bar.enable_steady_tick(Duration::from_millis(500));
+        Self { ending, bar }
+    }
+
+    pub(super) fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+impl Watch for OnTerminal {
+    fn progress(&self, p: &Progress) {
+        self.bar.set_length(p.total.into());
+        self.bar.set_position((p.done + p.rejected).into());
+        self.bar.set_message(line(p));
+    }
+
+    fn cancelled(&self) -> bool {
+        self.ending.is_asked()
+    }
+}
+
+/// Lines on standard error, which the daemon keeps as the job's log.
+#[derive(Debug)]
+pub(super) struct ToLog {
+    ending: Ending,
+    kind: &'static str,
+    last: Mutex<Option<(Instant, Stage, u32)>>,
+}
+
+impl ToLog {
+    pub(super) fn new(ending: Ending, kind: &'static str) -> Self {
+        Self { ending, kind, last: Mutex::new(None) }
+    }
+
+    pub(super) fn done(&self, report: &Report) {
+        let (examples, rejected) = (report.result.examples, report.result.rejected.len());
+        eprintln!("{}: {examples} examples, {rejected} rejected, in {:.0} s", self.kind, report.run.wall_s);
+    }
+}
+
+impl Watch for ToLog {
+    fn progress(&self, p: &Progress) {
+        let mut last = self.last.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let is_news = last.is_none_or(|(at, stage, rejected)| {
+            at.elapsed() >= LOG_INTERVAL || stage != p.stage || rejected != p.rejected
+        });
+        if is_news {
+            eprintln!("{}: {} of {}, {}", self.kind, p.done + p.rejected, p.total, line(p));
+            *last = Some((Instant::now(), p.stage, p.rejected));
+        }
+    }
+
+    fn cancelled(&self) -> bool {
+        self.ending.is_asked()
+    }
+}
+
+fn line(p: &Progress) -> String {
+    match (p.stage, p.seconds_left) {
+        (Stage::Interactions, _) => "draws interactions".to_owned(),
+        (Stage::Database, _) => "writes the database".to_owned(),
+        (Stage::Examples, None) => format!("{} rejected", p.rejected),
+        (Stage::Examples, Some(seconds)) => {
+            let left = HumanDuration(Duration::from_secs_f64(seconds.clamp(0.0, 1e9)));
+            format!("{} rejected, {left} left", p.rejected)
+        }
+    }
+}
