@@ -41,6 +41,8 @@ pub enum Command {
     Train(TrainArgs),
     /// Prints the JSON Schema of scene files.
     Schema,
+    /// Solves a case accurately: a mesh, its materials, supports and loads; prints what its probes tell.
+    Solve(SolveArgs),
     /// Becomes the process of a job.
     #[command(hide = true)]
     Child(ChildArgs),
@@ -203,6 +205,16 @@ pub enum TrainKind {
 pub struct CheckArgs {
     /// Scene file, or `wedge` for the built-in one.
     pub scene: PathBuf,
+}
+
+/// `plicad solve`.
+#[derive(Debug, Args)]
+pub struct SolveArgs {
+    /// Case file; configs/cases/cantilever.toml explains every key.
+    pub case: PathBuf,
+    /// Result for ParaView, a .vtu file: displacement, Cauchy and von Mises stress, det F, regions.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
 }
 
 /// `plicad demo`.

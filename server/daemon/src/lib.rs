@@ -4,6 +4,7 @@
 //! become simulation types in [`wire`], and everything else moves bytes and time.
 
 pub mod bus;
+pub mod case;
 pub mod cli;
 pub mod commands;
 pub mod config;

@@ -187,6 +187,31 @@ impl HexMesh {
         neighbours
     }
 
+    /// For every node the number of its body, `[n_nodes]`, and how many bodies there are: hexahedra that share a node belong
+    /// to one body. Bodies are numbered in the order of their first nodes.
+    pub fn bodies(&self) -> (Vec<usize>, usize) {
+        let neighbours = self.node_neighbours();
+        let mut body_of_node = vec![usize::MAX; self.n_nodes()];
+        let mut n_bodies = 0;
+        for first in 0..self.n_nodes() {
+            if body_of_node[first] != usize::MAX {
+                continue;
+            }
+            body_of_node[first] = n_bodies;
+            let mut waiting = vec![first];
+            while let Some(node) = waiting.pop() {
+                for next in neighbours[node].iter().map(|next| next.index()) {
+                    if body_of_node[next] == usize::MAX {
+                        body_of_node[next] = n_bodies;
+                        waiting.push(next);
+                    }
+                }
+            }
+            n_bodies += 1;
+        }
+        (body_of_node, n_bodies)
+    }
+
     fn faces(&self) -> impl Iterator<Item = [NodeIdx; 4]> + '_ {
         self.hexes.iter().flat_map(|corners| HEX_FACES.map(|face| face.map(|corner| corners[corner])))
     }

@@ -127,3 +127,14 @@ fn the_u_shape_of_these_tests_has_its_gap() {
     let in_gap = |x: Point3<f64>| x.x > 0.02 && x.x < 0.03 && x.z > 0.01;
     assert!(!mesh.hex_indices().any(|hex| in_gap(centre(&mesh, hex))));
 }
+
+#[test]
+fn bodies_that_share_no_node_are_apart() {
+    let (mut nodes, mut hexes) = parts_of(&block([0.1; 3], [2, 1, 1]));
+    assert_eq!(HexMesh::new(nodes.clone(), hexes.clone()).unwrap().bodies(), (vec![0; 12], 1));
+    let n = nodes.len() as u32;
+    nodes.extend(nodes.clone().iter().map(|x| x + Vector3::new(1.0, 0.0, 0.0)));
+    hexes.extend(hexes.clone().iter().map(|hex| hex.map(|node| NodeIdx(node.0 + n))));
+    let (bodies, n_bodies) = HexMesh::new(nodes, hexes).unwrap().bodies();
+    assert_eq!((n_bodies, &bodies[..12], &bodies[12..]), (2, &[0; 12][..], &[1; 12][..]));
+}

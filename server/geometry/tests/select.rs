@@ -140,7 +140,7 @@ fn groups_select_nodes_faces_and_hexahedra() {
     assert_eq!(error, "no group `top`; the mesh has `corner`, `edge`, `bottom`, `77`, `end`, `soft`, `stiff`");
     let error = group("bottom").hexes(&mesh, &groups).unwrap_err().to_string();
     assert_eq!(error, "group `bottom` has no hexahedra: it is a group of faces");
-    assert_eq!(group("edge").faces(&mesh, &groups), Err(SelectError::Empty { n: 64, of: "boundary faces" }));
+    assert_eq!(group("edge").faces(&mesh, &groups), Err(SelectError::Empty { n: 40, of: "boundary faces" }));
     let NamedMesh { mesh, groups } = boxes("boxes-appended-raw.vtu");
     assert_eq!(group("fixed=1").faces(&mesh, &groups).unwrap().len(), 8, "faces with all corners in a group of points");
 }

@@ -7,6 +7,7 @@ pub mod demo;
 pub mod schema;
 pub mod serve;
 pub mod simulate;
+pub mod solve;
 pub mod train;
 
 use std::path::Path;
@@ -24,6 +25,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Check(args) => check::run(args, cli.json),
         Command::Train(args) => train::run(args, cli.json),
         Command::Schema => schema::run(cli.json),
+        Command::Solve(args) => solve::run(args, cli.json),
         Command::Child(args) => child::run(args),
     }
 }

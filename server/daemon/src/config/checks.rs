@@ -12,25 +12,25 @@ const LARGEST_M: f64 = 1e3;
 
 /// Checks values against a document's lines.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Check<'a> {
+pub(crate) struct Check<'a> {
     document: &'a Document,
 }
 
 impl<'a> Check<'a> {
-    pub(super) fn new(document: &'a Document) -> Self {
+    pub(crate) fn new(document: &'a Document) -> Self {
         Self { document }
     }
 
-    pub(super) fn document(&self) -> &'a Document {
+    pub(crate) fn document(&self) -> &'a Document {
         self.document
     }
 
-    pub(super) fn error(&self, key: &str, problem: impl Into<String>, advice: impl Into<String>) -> ConfigError {
+    pub(crate) fn error(&self, key: &str, problem: impl Into<String>, advice: impl Into<String>) -> ConfigError {
         self.document.error(key, problem, advice)
     }
 
     /// `value` if it lies in `[least, most]`.
-    pub(super) fn number(&self, key: &str, value: f64, least: f64, most: f64) -> Result<f64, ConfigError> {
+    pub(crate) fn number(&self, key: &str, value: f64, least: f64, most: f64) -> Result<f64, ConfigError> {
         if value.is_finite() && (least..=most).contains(&value) {
             return Ok(value);
         }
@@ -39,17 +39,17 @@ impl<'a> Check<'a> {
     }
 
     /// A whole number in `[least, most]`.
-    pub(super) fn count(&self, key: &str, value: u32, least: u32, most: u32) -> Result<u32, ConfigError> {
+    pub(crate) fn count(&self, key: &str, value: u32, least: u32, most: u32) -> Result<u32, ConfigError> {
         self.number(key, value.into(), least.into(), most.into()).map(|_| value)
     }
 
     /// A key that its neighbours make necessary.
-    pub(super) fn required<T>(&self, key: &str, value: Option<T>, because: &str) -> Result<T, ConfigError> {
+    pub(crate) fn required<T>(&self, key: &str, value: Option<T>, because: &str) -> Result<T, ConfigError> {
         value.ok_or_else(|| self.error(key, format!("is missing: {because} needs it"), "add the key"))
     }
 
     /// A key that has no meaning beside its neighbours.
-    pub(super) fn absent<T>(&self, key: &str, value: &Option<T>, because: &str) -> Result<(), ConfigError> {
+    pub(crate) fn absent<T>(&self, key: &str, value: &Option<T>, because: &str) -> Result<(), ConfigError> {
         match value {
             None => Ok(()),
             Some(_) => Err(self.error(key, format!("has no meaning with {because}"), "remove the key")),
@@ -57,7 +57,7 @@ impl<'a> Check<'a> {
     }
 
     /// Components within 1 km of the origin.
-    pub(super) fn vector(&self, key: &str, value: [f64; 3]) -> Result<Vector3<f64>, ConfigError> {
+    pub(crate) fn vector(&self, key: &str, value: [f64; 3]) -> Result<Vector3<f64>, ConfigError> {
         for component in value {
             self.number(key, component, -LARGEST_M, LARGEST_M)?;
         }
@@ -65,12 +65,12 @@ impl<'a> Check<'a> {
     }
 
     /// A point within 1 km of the origin.
-    pub(super) fn point(&self, key: &str, value: [f64; 3]) -> Result<Point3<f64>, ConfigError> {
+    pub(crate) fn point(&self, key: &str, value: [f64; 3]) -> Result<Point3<f64>, ConfigError> {
         self.vector(key, value).map(Point3::from)
     }
 
     /// Lower and upper corner of a box with positive extents.
-    pub(super) fn corners(&self, key: &str, min: [f64; 3], max: [f64; 3]) -> Result<[Point3<f64>; 2], ConfigError> {
+    pub(crate) fn corners(&self, key: &str, min: [f64; 3], max: [f64; 3]) -> Result<[Point3<f64>; 2], ConfigError> {
         let corners = [self.point(&format!("{key}.min_m"), min)?, self.point(&format!("{key}.max_m"), max)?];
         if (0..3).all(|i| min[i] <= max[i]) {
             return Ok(corners);
@@ -80,7 +80,7 @@ impl<'a> Check<'a> {
     }
 
     /// A quaternion of unit length within 1e-2, normalised.
-    pub(super) fn rotation(&self, key: &str, xyzw: [f64; 4]) -> Result<UnitQuaternion<f64>, ConfigError> {
+    pub(crate) fn rotation(&self, key: &str, xyzw: [f64; 4]) -> Result<UnitQuaternion<f64>, ConfigError> {
         let q = Quaternion::new(xyzw[3], xyzw[0], xyzw[1], xyzw[2]);
         let norm = q.norm();
         if norm.is_finite() && (norm - 1.0).abs() <= UNIT_TOLERANCE {
@@ -91,14 +91,14 @@ impl<'a> Check<'a> {
     }
 
     /// A rigid transform.
-    pub(super) fn transform(&self, key: &str, raw: &RawTransform) -> Result<Isometry3<f64>, ConfigError> {
+    pub(crate) fn transform(&self, key: &str, raw: &RawTransform) -> Result<Isometry3<f64>, ConfigError> {
         let translation = self.vector(&format!("{key}.translation_m"), raw.translation_m)?;
         let rotation = self.rotation(&format!("{key}.rotation_xyzw"), raw.rotation_xyzw)?;
         Ok(Isometry3::from_parts(Translation3::from(translation), rotation))
     }
 
     /// A name that can be part of a key on the bus.
-    pub(super) fn name(&self, key: &str, name: &str) -> Result<(), ConfigError> {
+    pub(crate) fn name(&self, key: &str, name: &str) -> Result<(), ConfigError> {
         plica_protocol::keys::check_name(name)
             .map_err(|e| self.error(key, e.to_string(), "rename it: it becomes part of a key on the bus"))
     }

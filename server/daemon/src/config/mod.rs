@@ -2,13 +2,13 @@
 
 mod accurate;
 mod bench;
-mod checks;
+pub(crate) mod checks;
 mod document;
 mod error;
 mod files;
 mod obj;
 mod object;
-mod raw;
+pub(crate) mod raw;
 mod runtime;
 mod tool;
 mod training;

@@ -1,0 +1,155 @@
+//! Applying loads in steps: a step that fails is halved, and grows again after successes.
+
+use std::ops::ControlFlow;
+
+use nalgebra::Vector3;
+use plica_accurate::{Info, Params, SolveError, Solver};
+use serde::Serialize;
+
+use super::SolveOptions;
+use super::problem::{Problem, energies};
+
+/// What is told before every Newton step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct News {
+    /// Share of the loads already carried.
+    pub reached: f64,
+    /// Share that this step is to carry.
+    pub target: f64,
+    /// Newton steps of this load step.
+    pub iteration: u32,
+    /// Largest force left, as a share of the largest nodal force.
+    pub residual: f64,
+}
+
+/// One load step that was carried.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LoadStep {
+    /// Share of the loads at its end.
+    pub load: f64,
+    /// Newton steps.
+    pub iterations: u32,
+    /// Newton steps whose matrix was not positive definite.
+    pub indefinite_steps: u32,
+    /// Halvings by the line search.
+    pub halvings: u32,
+    /// Residual before every Newton step and at the end, as a share of the largest nodal force.
+    pub residuals: Vec<f64>,
+    /// Smallest `det F` of its result.
+    pub smallest_jacobian: Option<f64>,
+}
+
+/// An equilibrium under all loads.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    x: Vec<Vector3<f64>>,
+    /// Load steps that were carried.
+    pub steps: Vec<LoadStep>,
+    /// Load steps that failed and were halved.
+    pub n_failed: u32,
+    /// Unknowns.
+    pub n_unknowns: usize,
+    /// Values of the Cholesky factor.
+    pub n_factor_values: usize,
+}
+
+/// Why there is no equilibrium under all loads.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Failure {
+    /// The least step failed.
+    #[error("no equilibrium beyond {reached:.4} of the loads: {error}, on the way to {target:.4}")]
+    Stuck {
+        /// Share of the loads that was carried.
+        reached: f64,
+        /// Share that was not.
+        target: f64,
+        /// How the last attempt failed.
+        error: SolveError,
+    },
+    /// The callback asked to stop, or there is no memory.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+}
+
+impl Solution {
+    /// Positions of all nodes \[m\].
+    pub fn positions(&self) -> &[Vector3<f64>] {
+        &self.x
+    }
+
+    /// Newton steps of all load steps that were carried.
+    pub fn iterations(&self) -> u32 {
+        self.steps.iter().map(|step| step.iterations).sum()
+    }
+
+    /// Those of them whose matrix was not positive definite.
+    pub fn indefinite_steps(&self) -> u32 {
+        self.steps.iter().map(|step| step.indefinite_steps).sum()
+    }
+
+    /// Smallest `det F` of the result.
+    pub fn smallest_jacobian(&self) -> Option<f64> {
+        self.steps.last().and_then(|step| step.smallest_jacobian)
+    }
+}
+
+/// Applies the loads of `problem` from rest on. `observer` is called before every Newton step and may cancel.
+///
+/// # Errors
+/// [`Failure`].
+pub fn follow(
+    problem: &Problem,
+    options: &SolveOptions,
+    observer: &mut dyn FnMut(News) -> ControlFlow<()>,
+) -> Result<Solution, Failure> {
+    let mut x: Vec<_> = problem.mesh().nodes().iter().map(|node| node.coords).collect();
+    let loads = problem.loads_at(1.0);
+    let mut solver =
+        Solver::new(&problem.constraints_at(1.0), &energies(problem.solid(), &loads)).map_err(SolveError::from)?;
+    let (n_unknowns, n_factor_values) = solver.size();
+    let largest_step = 1.0 / f64::from(options.steps);
+    let least_step = largest_step * 0.5_f64.powi(options.max_halvings as i32);
+    let (mut reached, mut step, mut n_failed, mut steps) = (0.0, largest_step, 0, Vec::new());
+    while reached < 1.0 {
+        // What rounding would leave for one more step is taken along.
+        let target = if reached + 1.01 * step >= 1.0 { 1.0 } else { reached + step };
+        let mut trial = x.clone();
+        match attempt(problem, options, &mut solver, [reached, target], &mut trial, observer) {
+            Ok(info) => {
+                steps.push(LoadStep::new(target, info));
+                (x, reached) = (trial, target);
+                step = (2.0 * step).min(largest_step);
+            }
+            Err(error @ (SolveError::Cancelled { .. } | SolveError::Factor(_))) => return Err(error.into()),
+            Err(error) if step <= least_step => return Err(Failure::Stuck { reached, target, error }),
+            Err(_) => {
+                n_failed += 1;
+                step *= 0.5;
+            }
+        }
+    }
+    Ok(Solution { x, steps, n_failed, n_unknowns, n_factor_values })
+}
+
+fn attempt(
+    problem: &Problem,
+    options: &SolveOptions,
+    solver: &mut Solver,
+    [reached, target]: [f64; 2],
+    x: &mut [Vector3<f64>],
+    observer: &mut dyn FnMut(News) -> ControlFlow<()>,
+) -> Result<Info, SolveError> {
+    let loads = problem.loads_at(target);
+    let params = Params { tolerance: options.tolerance, max_iterations: options.max_iterations };
+    let mut tell = |progress: plica_accurate::Progress| {
+        observer(News { reached, target, iteration: progress.iteration, residual: progress.residual })
+    };
+    solver.minimise(&energies(problem.solid(), &loads), &problem.constraints_at(target), &params, x, &mut tell)
+}
+
+impl LoadStep {
+    fn new(load: f64, info: Info) -> Self {
+        let Info { residuals, iterations, indefinite_steps, halvings, smallest_jacobian, .. } = info;
+        Self { load, iterations, indefinite_steps, halvings, residuals, smallest_jacobian }
+    }
+}
