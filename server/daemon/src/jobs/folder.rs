@@ -7,7 +7,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use plica_protocol::jobs::{JobFile, JobState};
-use plica_training::{Job, Progress};
+use plica_training::{Job, Progress, Stage};
 use serde::{Deserialize, Serialize};
 
 use super::files::{read_json, to_json, write_atomically};
@@ -92,9 +92,21 @@ impl JobFolder {
         write_atomically(&self.0.join("state.json"), &to_json(standing))
     }
 
-    /// Reads `progress.json`; `None` before there is one.
+    /// What `progress.json` says; `None` before there is one. A process that begins anew says that nothing is finished
+    /// until it has read what is there: then the examples on disk are counted.
     pub fn progress(&self) -> Option<Progress> {
-        read_json(&self.0.join("progress.json")).ok()
+        let progress: Progress = read_json(&self.0.join("progress.json")).ok()?;
+        if progress.stage != Stage::Interactions {
+            return Some(progress);
+        }
+        let (done, rejected) = (self.count(".safetensors"), self.count(".rejected.json"));
+        Some(Progress { done, rejected, ..progress })
+    }
+
+    fn count(&self, ending: &str) -> u32 {
+        let is_one = |name: &str| name.ends_with(ending) && !name.starts_with('.');
+        let entries = fs::read_dir(self.0.join("examples")).into_iter().flatten().flatten();
+        entries.filter(|entry| entry.file_name().to_str().is_some_and(is_one)).count() as u32
     }
 
     /// Whether a process works in it, one started by hand or one that is still ending: it holds a lock.
@@ -148,6 +160,14 @@ mod tests {
         fs::write(folder.path().join("progress.json"), progress).unwrap();
         let progress = job.progress().unwrap();
         assert_eq!((progress.done, progress.rejected, progress.total), (3, 1, 8));
+        let beginning = r#"{"stage": "interactions", "done": 0, "rejected": 0, "total": 8, "seconds_left": null}"#;
+        fs::write(folder.path().join("progress.json"), beginning).unwrap();
+        fs::create_dir(folder.path().join("examples")).unwrap();
+        for name in ["00000.safetensors", "00003.safetensors", "00001.rejected.json", ".00002.safetensors.tmp"] {
+            fs::write(folder.path().join("examples").join(name), "").unwrap();
+        }
+        let progress = job.progress().unwrap();
+        assert_eq!((progress.done, progress.rejected, progress.total), (2, 1, 8), "what is on disk");
         assert!(job.job().unwrap_err().contains("job.json cannot be read"));
         assert_eq!(job.last_words(), None);
     }
