@@ -66,6 +66,8 @@ fn the_vtu_is_read_back_with_its_fields() {
     let cell_fields = [Field::Scalars("number", &volumes), Field::Tensors("stress_pa", &stress)];
     write_vtu(&path, &mesh, &fields, &cell_fields).unwrap();
 
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(text.contains("type=\"Int64\" Name=\"connectivity\"") && text.contains("type=\"Int64\" Name=\"offsets\""));
     let read = vtkio::Vtk::import(&path).unwrap();
     let DataSet::UnstructuredGrid { pieces, .. } = read.data else { panic!("another kind of grid") };
     let Piece::Inline(piece) = &pieces[0] else { panic!("no inline piece") };

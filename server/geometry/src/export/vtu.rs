@@ -81,7 +81,17 @@ pub fn write_vtu(
     };
     let mut bytes = Vec::new();
     vtk.write_xml(&mut bytes).map_err(|error| ExportError::Vtk(error.to_string()))?;
-    write_file(path, &bytes)
+    let text = String::from_utf8(bytes).map_err(|error| ExportError::Vtk(error.to_string()))?;
+    write_file(path, signed_indices(text).as_bytes())
+}
+
+/// Indices as the signed numbers that VTK itself writes; they are far from the sign bit. Readers made with numpy turn a mixture
+/// of unsigned and signed ones into floating-point numbers.
+fn signed_indices(text: String) -> String {
+    let names = ["connectivity", "offsets"];
+    names.iter().fold(text, |text, name| {
+        text.replace(&format!("type=\"UInt64\" Name=\"{name}\""), &format!("type=\"Int64\" Name=\"{name}\""))
+    })
 }
 
 fn check_lengths(fields: &[Field<'_>], n_expected: usize, of: &'static str) -> Result<(), ExportError> {
