@@ -33,7 +33,6 @@ pub use error::JobError;
 pub use folder::{JobFolder, Standing};
 pub use priority::{Priority, lower};
 pub use process::Launch;
-pub use reason::INTERRUPTED;
 pub use scene::ServedScene;
 
 use fetch::Sums;
