@@ -53,11 +53,6 @@ pub trait Energy {
         None
     }
 
-    /// Whether no element that could is turned over. Given coordinates do not travel beyond that in one step.
-    fn is_upright(&self, x: &[Vector3<f64>]) -> bool {
-        self.smallest_jacobian(x).is_none_or(|j| j > 0.0)
-    }
-
     /// Where all nodes are at rest \[m\], for energies that know: the solver orders its unknowns by it.
     fn rest_positions(&self) -> Option<&[Vector3<f64>]> {
         None

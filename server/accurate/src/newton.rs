@@ -17,6 +17,8 @@ use crate::hessian::Hessian;
 use acceptance::Total;
 pub use report::{Info, Params, Progress, SolveError};
 
+/// Residual at which given coordinates go on after a stop.
+const RELAXED: f64 = 1e-2;
 /// Forces below this share of stiffness times position are rounding.
 const FORCE_ROUNDING: f64 = 256.0 * f64::EPSILON;
 
@@ -32,6 +34,20 @@ pub struct Solver {
     trial: Vec<Vector3<f64>>,
     /// Mean diagonal of the matrix that was factorised last \[N/m\].
     stiffness: f64,
+}
+
+/// What is minimised, where, and how far.
+#[derive(Clone, Copy)]
+struct Problem<'a> {
+    energies: &'a [&'a dyn Energy],
+    constraints: &'a Constraints,
+    params: &'a Params,
+}
+
+impl Problem<'_> {
+    fn has_potential(&self) -> bool {
+        self.energies.iter().all(|e| e.has_potential())
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -73,9 +89,9 @@ impl Solver {
 
     /// Moves `x: [n_nodes]` \[m\] to a minimum of the sum of `energies` where `constraints` hold.
     ///
-    /// Given coordinates travel to their targets with the first steps, the free ones following linearly. The exact Hessian
-    /// is used where it is positive definite, else a projected one \[SGK19\]. `observer` is called before every step and may
-    /// cancel.
+    /// Given coordinates travel to their targets with the first steps, the free ones following linearly; where the energy
+    /// would not be finite they stop on the way until the free ones have come to rest. The exact Hessian is used where it is
+    /// positive definite, else a projected one \[SGK19\]. `observer` is called before every step and may cancel.
     ///
     /// # Errors
     /// See [`SolveError`].
@@ -91,38 +107,46 @@ impl Solver {
         observer: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<Info, SolveError> {
         assert_eq!((x.len(), constraints.n_nodes()), (self.gradient.len(), self.gradient.len()), "nodes");
+        let problem = Problem { energies, constraints, params };
+        if !Total::of(energies, x).value.is_finite() {
+            return Err(SolveError::NotFinite { iterations: 0 });
+        }
         let mut info = Info::default();
+        // After a step that given coordinates could not go to its end, the free ones come to rest first.
+        let mut is_relaxing = false;
         loop {
-            let iterations = info.iterations;
-            let moves = self.find_motion(constraints, x);
-            let residual = self.find_residual(energies, constraints, params.tolerance, x);
+            let is_on_its_way = self.find_motion(constraints, x);
+            let residual = self.find_residual(&problem, x);
             info.residuals.push(residual.relative);
-            if !(residual.relative.is_finite() && (iterations > 0 || Total::of(energies, x).value.is_finite())) {
-                return Err(SolveError::NotFinite { iterations });
-            }
-            if observer(Progress { iteration: iterations, residual: residual.relative }).is_break() {
-                return Err(SolveError::Cancelled { iterations });
-            }
-            if !moves && residual.relative <= params.tolerance {
+            if is_done(&problem, &info, is_on_its_way, observer)? {
                 break;
             }
-            if iterations == params.max_iterations {
-                let (residual, tolerance) = (residual.relative, params.tolerance);
-                return Err(SolveError::NotConverged { iterations, residual, tolerance });
-            }
-            self.find_direction(energies, constraints, moves, x, &mut info)?;
-            let went = if moves {
-                self.follow_given(energies, constraints, x, &mut info)
-            } else {
-                self.search_line(energies, constraints, residual, x, &mut info)
-            };
-            if !went {
-                return Err(SolveError::LineSearch { iterations, residual: residual.relative });
-            }
+            is_relaxing &= residual.relative > RELAXED;
+            let moves = is_on_its_way && !is_relaxing;
+            let length = self.step(&problem, moves, residual, x, &mut info)?;
+            is_relaxing |= moves && length < 1.0;
             info.iterations += 1;
         }
-        info.smallest_jacobian = smallest_jacobian(energies, x);
+        info.smallest_jacobian = energies.iter().filter_map(|e| e.smallest_jacobian(x)).reduce(f64::min);
         Ok(info)
+    }
+
+    /// One Newton step, with given coordinates `moves` or not; the share of it that was taken.
+    fn step(
+        &mut self,
+        problem: &Problem<'_>,
+        moves: bool,
+        residual: Residual,
+        x: &mut [Vector3<f64>],
+        info: &mut Info,
+    ) -> Result<f64, SolveError> {
+        if !moves {
+            self.motion.fill(Vector3::zeros());
+        }
+        self.find_direction(problem, moves, x, info)?;
+        let length =
+            if moves { self.follow_given(problem, x, info) } else { self.search_line(problem, residual, x, info) };
+        length.ok_or(SolveError::LineSearch { iterations: info.iterations, residual: residual.relative })
     }
 
     /// What given coordinates still have to move; whether any has.
@@ -135,16 +159,10 @@ impl Solver {
         moves
     }
 
-    fn find_residual(
-        &mut self,
-        energies: &[&dyn Energy],
-        constraints: &Constraints,
-        tolerance: f64,
-        x: &[Vector3<f64>],
-    ) -> Residual {
+    fn find_residual(&mut self, problem: &Problem<'_>, x: &[Vector3<f64>]) -> Residual {
         let mut largest_force = 0.0_f64;
         self.gradient.fill(Vector3::zeros());
-        for energy in energies {
+        for energy in problem.energies {
             self.single.fill(Vector3::zeros());
             energy.add_gradient(x, &mut self.single);
             for (sum, force) in self.gradient.iter_mut().zip(&self.single) {
@@ -152,21 +170,39 @@ impl Solver {
                 largest_force = largest_force.max(force.norm());
             }
         }
-        clear_given(&mut self.gradient, constraints);
+        clear_given(&mut self.gradient, problem.constraints);
         let largest = self.gradient.iter().map(Vector3::norm).fold(0.0, nan_max);
         let norm = self.gradient.iter().map(Vector3::norm_squared).sum::<f64>().sqrt();
         let rounding = FORCE_ROUNDING * self.stiffness * x.iter().map(Vector3::amax).fold(0.0, f64::max);
-        let scale = largest_force.max(rounding / tolerance);
+        let scale = largest_force.max(rounding / problem.params.tolerance);
         Residual { relative: if largest == 0.0 { 0.0 } else { largest / scale }, norm }
     }
 }
 
-fn dot(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
+/// Whether the solve has converged.
+fn is_done(
+    problem: &Problem<'_>,
+    info: &Info,
+    is_on_its_way: bool,
+    observer: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<bool, SolveError> {
+    let Params { tolerance, max_iterations } = *problem.params;
+    let (iterations, residual) = (info.iterations, info.residuals.last().copied().unwrap_or(f64::NAN));
+    if !residual.is_finite() {
+        return Err(SolveError::NotFinite { iterations });
+    }
+    if observer(Progress { iteration: iterations, residual }).is_break() {
+        return Err(SolveError::Cancelled { iterations });
+    }
+    let is_done = !is_on_its_way && residual <= tolerance;
+    if !is_done && iterations == max_iterations {
+        return Err(SolveError::NotConverged { iterations, residual, tolerance });
+    }
+    Ok(is_done)
 }
 
-fn smallest_jacobian(energies: &[&dyn Energy], x: &[Vector3<f64>]) -> Option<f64> {
-    energies.iter().filter_map(|e| e.smallest_jacobian(x)).reduce(f64::min)
+fn dot(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }
 
 fn clear_given(vectors: &mut [Vector3<f64>], constraints: &Constraints) {

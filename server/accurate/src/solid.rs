@@ -7,7 +7,7 @@ use plica_geometry::{HexIdx, HexMesh, NodeIdx, isoparametric};
 
 use crate::energy::{Energy, Projection};
 use crate::hessian::Hessian;
-use crate::material::{Law, Material, MaterialError, MaterialModel};
+use crate::material::{Law, Material, MaterialError};
 use element::Element;
 
 /// Reference coordinates of the 2 x 2 x 2 Gauss points, in the order of the corners.
@@ -130,10 +130,6 @@ impl Energy for Solid {
 
     fn smallest_jacobian(&self, x: &[Vector3<f64>]) -> Option<f64> {
         self.elements.iter().map(|e| e.smallest_jacobian(x)).reduce(f64::min)
-    }
-
-    fn is_upright(&self, x: &[Vector3<f64>]) -> bool {
-        self.elements.iter().all(|e| e.model() == MaterialModel::Linear || e.smallest_jacobian(x) > 0.0)
     }
 
     fn rest_positions(&self) -> Option<&[Vector3<f64>]> {

@@ -5,6 +5,7 @@ mod common;
 
 use std::ops::ControlFlow;
 
+use common::random::Random;
 use common::{affine, distance, material, rest, sides, solve};
 use nalgebra::{Rotation3, Unit, Vector3};
 use plica_accurate::{
@@ -187,6 +188,52 @@ fn rigid_motion_of_the_supports_is_no_load() {
     assert!(distance(&x, &expected) <= 1e-9, "{}", distance(&x, &expected));
 }
 
+/// Given coordinates arrive in one step of a linear solid, to the last bit, and the free ones with them.
+#[test]
+fn prescribed_displacements_arrive_exactly() {
+    let beam = Beam::new();
+    let solid = Solid::uniform(&beam.mesh, material(MaterialModel::Linear, 3e4, 0.3)).unwrap();
+    let mut random = Random::new(11);
+    let mut constraints = beam.constraints.clone();
+    let mut targets = Vec::new();
+    for (node, x) in beam.mesh.nodes().iter().enumerate().filter(|(_, x)| sides(x, SIZE)[0][1]) {
+        let target = x.coords + random.vector(1e-2);
+        constraints.hold(node, &target);
+        targets.push((node, target));
+    }
+    let mut x = rest(&beam.mesh);
+    let info = solve(&[&solid], &constraints, &Params::default(), &mut x).unwrap();
+    assert_eq!(info.iterations, 1, "{info:?}");
+    assert!(targets.iter().all(|&(node, target)| x[node] == target));
+}
+
+/// The top of a cube sinks by 70 % while it turns by 100 degrees. Going there at once would turn elements over, which costs
+/// the compressible material an infinite energy: it stops on the way and goes on from a state at rest.
+#[test]
+fn given_coordinates_stop_where_the_energy_would_be_infinite() {
+    let size = [0.02; 3];
+    let mesh = block(size, [4, 4, 4]);
+    let middle = Vector3::new(0.01, 0.01, 0.0);
+    let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), 100_f64.to_radians());
+    let mut constraints = Constraints::none(mesh.n_nodes());
+    let mut top = Vec::new();
+    for (node, x) in mesh.nodes().iter().enumerate() {
+        let [is_low, is_high] = sides(x, size)[2];
+        if is_low {
+            constraints.hold(node, &x.coords);
+        } else if is_high {
+            top.push((node, (middle + turn * (x.coords - middle)).component_mul(&Vector3::new(1.0, 1.0, 0.3))));
+        }
+    }
+    top.iter().for_each(|(node, target)| constraints.hold(*node, target));
+    let solid = Solid::uniform(&mesh, material(MaterialModel::CompressibleNeoHookean, 3e4, 0.45)).unwrap();
+    let mut x = rest(&mesh);
+    let info = solve(&[&solid], &constraints, &Params::default(), &mut x).unwrap();
+    println!("turned and sunk: {} steps, {} halvings, J {:?}", info.iterations, info.halvings, info.smallest_jacobian);
+    assert!(info.halvings > 0 && info.smallest_jacobian.unwrap() > 0.0);
+    assert!(top.iter().all(|&(node, target)| x[node] == target));
+}
+
 #[test]
 fn a_solver_serves_one_load_after_another_with_the_same_bits() {
     let beam = Beam::new();
@@ -202,4 +249,14 @@ fn a_solver_serves_one_load_after_another_with_the_same_bits() {
     assert_eq!(results[0], results[2]);
     assert_ne!(results[0].0, results[1].0);
     assert_eq!(results[0].0, beam.solve(&loads[0], &Params::default()).1, "as by a fresh solver");
+}
+
+/// Whoever solves many problems at once moves solvers to threads and shares the solid.
+#[test]
+fn solvers_may_move_between_threads() {
+    fn is_send<T: Send>() {}
+    fn is_shared<T: Sync>() {}
+    is_send::<Solver>();
+    is_shared::<Solid>();
+    is_shared::<Constraints>();
 }

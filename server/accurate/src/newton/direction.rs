@@ -2,9 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::{Info, SolveError, Solver, clear_given, dot, follower};
-use crate::constraints::Constraints;
-use crate::energy::{Energy, Projection};
+use super::{Info, Problem, SolveError, Solver, clear_given, dot, follower};
+use crate::energy::Projection;
 
 /// First shift of a matrix that stays indefinite, as a share of its mean diagonal; every further one is ten times larger.
 const FIRST_SHIFT: f64 = 1e-6;
@@ -14,20 +13,19 @@ impl Solver {
     /// `direction = -H^-1 (gradient + H_free,given motion)`.
     pub(super) fn find_direction(
         &mut self,
-        energies: &[&dyn Energy],
-        constraints: &Constraints,
+        problem: &Problem<'_>,
         moves: bool,
         x: &[Vector3<f64>],
         info: &mut Info,
     ) -> Result<(), SolveError> {
-        let loads = self.factorise_somehow(energies, moves, x, info)?;
+        let loads = self.factorise_somehow(problem, moves, x, info)?;
         for ((b, g), lift) in self.right_hand_side.iter_mut().zip(&self.gradient).zip(self.hessian.lift()) {
             *b = lift - g;
         }
-        clear_given(&mut self.right_hand_side, constraints);
+        clear_given(&mut self.right_hand_side, problem.constraints);
         self.factor.solve(&self.hessian, &self.right_hand_side, &mut self.direction);
-        if energies.iter().any(|e| !e.has_potential()) {
-            self.follow_loads(energies, constraints, loads, x);
+        if !problem.has_potential() {
+            self.follow_loads(problem, loads, x);
         }
         for (direction, motion) in self.direction.iter_mut().zip(&self.motion) {
             *direction += motion;
@@ -39,19 +37,18 @@ impl Solver {
     /// one; shifts of it. The projection with which those loads are in the matrix.
     fn factorise_somehow(
         &mut self,
-        energies: &[&dyn Energy],
+        problem: &Problem<'_>,
         moves: bool,
         x: &[Vector3<f64>],
         info: &mut Info,
     ) -> Result<Projection, SolveError> {
         use Projection::{Exact, PositiveSemidefinite};
-        if self.factorise(energies, [Exact, Exact], moves, x) {
+        if self.factorise(problem, [Exact, Exact], moves, x) {
             return Ok(Exact);
         }
         info.indefinite_steps += 1;
-        let has_loads = energies.iter().any(|e| !e.has_potential());
-        if has_loads && self.factorise(energies, [Exact, PositiveSemidefinite], moves, x)
-            || self.factorise(energies, [PositiveSemidefinite; 2], moves, x)
+        if !problem.has_potential() && self.factorise(problem, [Exact, PositiveSemidefinite], moves, x)
+            || self.factorise(problem, [PositiveSemidefinite; 2], moves, x)
             || self.factorise_shifted()
         {
             return Ok(PositiveSemidefinite);
@@ -62,13 +59,13 @@ impl Solver {
     /// Projections are for energies with a potential and without.
     fn factorise(
         &mut self,
-        energies: &[&dyn Energy],
+        problem: &Problem<'_>,
         projections: [Projection; 2],
         moves: bool,
         x: &[Vector3<f64>],
     ) -> bool {
         self.hessian.clear(moves.then_some(&self.motion));
-        for energy in energies {
+        for energy in problem.energies {
             let projection = projections[usize::from(!energy.has_potential())];
             energy.add_hessian(x, projection, &mut self.hessian);
         }
@@ -79,19 +76,13 @@ impl Solver {
 
     /// Turns `H^-1 b` into `(H + R)^-1 b`, `R` being what the matrix lacks of loads without a potential; not where that would
     /// point uphill.
-    fn follow_loads(
-        &mut self,
-        energies: &[&dyn Energy],
-        constraints: &Constraints,
-        loads: Projection,
-        x: &[Vector3<f64>],
-    ) {
+    fn follow_loads(&mut self, problem: &Problem<'_>, loads: Projection, x: &[Vector3<f64>]) {
         let (hessian, factor, product) = (&self.hessian, &mut self.factor, &mut self.single);
         let mut direction = self.direction.clone();
         follower::solve(&mut direction, |v, out| {
             product.fill(Vector3::zeros());
-            energies.iter().for_each(|e| e.add_remainder_product(x, v, loads, product));
-            clear_given(product, constraints);
+            problem.energies.iter().for_each(|e| e.add_remainder_product(x, v, loads, product));
+            clear_given(product, problem.constraints);
             factor.solve(hessian, product, out);
         });
         if dot(&direction, &self.right_hand_side) > 0.0 {

@@ -3,87 +3,81 @@
 use nalgebra::Vector3;
 
 use super::acceptance::{Judgement, Start, Total};
-use super::{Info, Residual, Solver, dot};
-use crate::constraints::Constraints;
-use crate::energy::Energy;
+use super::{Info, Problem, Residual, Solver, dot};
 
 /// Share of the slope that may be left after a step that is judged by its slope \[HZ05\].
 const SLOPE_LEFT: f64 = 0.9;
 const MAX_HALVINGS: u32 = 30;
 
 impl Solver {
-    /// Takes the longest step that keeps the energy finite and turns no element over.
+    /// Takes the longest step at which the energy is finite, and returns its length.
     pub(super) fn follow_given(
         &mut self,
-        energies: &[&dyn Energy],
-        constraints: &Constraints,
+        problem: &Problem<'_>,
         x: &mut [Vector3<f64>],
         info: &mut Info,
-    ) -> bool {
-        let was_upright = energies.iter().all(|e| e.is_upright(x));
+    ) -> Option<f64> {
         let mut length = 1.0;
         for _ in 0..=MAX_HALVINGS {
             self.try_step(x, length);
             if length == 1.0 {
-                constraints.place(&mut self.trial);
+                problem.constraints.place(&mut self.trial);
             }
-            let is_upright = !was_upright || energies.iter().all(|e| e.is_upright(&self.trial));
-            if is_upright && Total::of(energies, &self.trial).value.is_finite() {
+            if Total::of(problem.energies, &self.trial).value.is_finite() {
                 x.copy_from_slice(&self.trial);
-                return true;
+                return Some(length);
             }
             info.halvings += 1;
             length *= 0.5;
         }
-        false
+        None
     }
 
-    /// Backtracks until the energy has fallen enough or, where its differences are rounding, the slope has.
+    /// Backtracks until the energy has fallen enough or, where its differences are rounding, the slope has; the length reached.
     pub(super) fn search_line(
         &mut self,
-        energies: &[&dyn Energy],
-        constraints: &Constraints,
+        problem: &Problem<'_>,
         residual: Residual,
         x: &mut [Vector3<f64>],
         info: &mut Info,
-    ) -> bool {
+    ) -> Option<f64> {
         let start = Start {
-            total: Total::of(energies, x),
+            total: Total::of(problem.energies, x),
             slope: dot(&self.gradient, &self.direction),
-            frozen_work: self.frozen_work(energies, x),
+            frozen_work: self.frozen_work(problem, x),
             norm: residual.norm,
-            has_potential: energies.iter().all(|e| e.has_potential()),
+            has_potential: problem.has_potential(),
         };
         let mut length = 1.0;
         for _ in 0..=MAX_HALVINGS {
             self.try_step(x, length);
-            let accepted = match start.judge(&Total::of(energies, &self.trial), length) {
+            let accepted = match start.judge(&Total::of(problem.energies, &self.trial), length) {
                 Judgement::Accept => true,
                 Judgement::Refuse => false,
-                Judgement::AskForces => self.is_better_by_forces(energies, constraints, &start),
+                Judgement::AskForces => self.is_better_by_forces(problem, &start),
             };
             if accepted {
                 x.copy_from_slice(&self.trial);
-                return true;
+                return Some(length);
             }
             info.halvings += 1;
             length *= 0.5;
         }
-        false
+        None
     }
 
     /// Work against the loads that have no potential, held as they are, along the whole step \[J\].
-    fn frozen_work(&mut self, energies: &[&dyn Energy], x: &[Vector3<f64>]) -> f64 {
+    fn frozen_work(&mut self, problem: &Problem<'_>, x: &[Vector3<f64>]) -> f64 {
         self.single.fill(Vector3::zeros());
-        energies.iter().filter(|e| !e.has_potential()).for_each(|e| e.add_gradient(x, &mut self.single));
+        problem.energies.iter().filter(|e| !e.has_potential()).for_each(|e| e.add_gradient(x, &mut self.single));
         dot(&self.single, &self.direction)
     }
 
     /// Judges `trial` by its forces; leaves the gradient as it was.
-    fn is_better_by_forces(&mut self, energies: &[&dyn Energy], constraints: &Constraints, start: &Start) -> bool {
+    fn is_better_by_forces(&mut self, problem: &Problem<'_>, start: &Start) -> bool {
         let gradient = self.gradient.clone();
         let trial = std::mem::take(&mut self.trial);
-        let found = self.find_residual(energies, constraints, 1.0, &trial);
+        let found = self.find_residual(problem, &trial);
         let slope_left = dot(&self.gradient, &self.direction);
         self.trial = trial;
         self.gradient = gradient;

@@ -44,10 +44,6 @@ impl Element {
         &self.nodes
     }
 
-    pub(super) fn model(&self) -> MaterialModel {
-        self.law.model
-    }
-
     pub(super) fn value(&self, x: &[Vector3<f64>]) -> f64 {
         let state = self.state(x);
         let local: f64 = self.points.iter().zip(&state.points).map(|(q, d)| q.weight * self.law.local_value(d)).sum();
