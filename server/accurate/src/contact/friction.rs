@@ -23,9 +23,13 @@ pub struct FrictionRow {
 impl FrictionRow {
     /// Traction against sliding, `t = tau min(1, b / |tau|)` with `tau = l + k T (p - a)`, `T = I - n n^T`; and `tau` \[Pa\].
     pub fn traction(&self, penalty_pa_per_m: f64, position: &Point3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-        let slip = position - self.anchor;
-        let trial = self.multiplier_pa + (slip - self.normal * self.normal.dot(&slip)) * penalty_pa_per_m;
+        let trial = self.multiplier_pa + self.along(&(position - self.anchor)) * penalty_pa_per_m;
         (trial.cap_magnitude(self.bound_pa), trial)
+    }
+
+    /// `T v`.
+    pub(super) fn along(&self, v: &Vector3<f64>) -> Vector3<f64> {
+        v - self.normal * self.normal.dot(v)
     }
 }
 

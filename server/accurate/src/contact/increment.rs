@@ -6,111 +6,166 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::friction::{Friction, FrictionRow};
 use super::normal::NormalContact;
-use super::press::{ContactParams, Press};
+use super::outcome::ContactInfo;
+use super::params::ContactParams;
+use super::press::Press;
 use super::state::ContactState;
+use crate::constraints::Constraints;
 use crate::energy::Energy;
 use crate::newton::{Info, Params, Progress, SolveError, Solver};
 
-/// Factor by which forces are found more exactly with every update of the multipliers.
-const NEWTON_TIGHTENING: f64 = 0.1;
+/// Share of the forces out of balance that is left for the next multipliers: about one Newton step.
+const LEFT_TO_NEXT: f64 = 0.3;
+/// How much larger the tolerances of pressures and of forces are in increments that do not end at a pose of the path.
+const ON_THE_WAY: [f64; 2] = [3.0, 100.0];
 
 /// An increment under way.
 pub(super) struct Increment<'a> {
     press: &'a Press<'a>,
     pose: Isometry3<f64>,
+    pressure_tolerance: f64,
+    newton_tolerance: f64,
+    /// `[n_points]`, and so all below.
     penalties: Vec<f64>,
+    friction_penalties: Vec<f64>,
     pressures: Vec<f64>,
+    tractions: Vec<Vector3<f64>>,
+    /// Multipliers of the pressure.
+    multipliers: Vec<f64>,
     rows: Vec<FrictionRow>,
 }
 
-/// Work done, failed increments included.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Work {
-    pub(super) outer_iterations: u32,
-    pub(super) newton_iterations: u32,
-    pub(super) indefinite_steps: u32,
-}
-
-/// How well an increment's multipliers fit its positions.
+/// How well pressures fit positions.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Fit {
-    /// Largest `|min(g, p / k)|` \[m\].
-    pub(super) complementarity_m: f64,
-    /// Largest slip that a traction below its bound still has, or excess over the bound as a displacement \[m\].
-    pub(super) friction_m: f64,
-    /// The larger one as a share of the face's size.
-    pub(super) relative: f64,
-    /// Deepest point inside the obstacle \[m\].
-    pub(super) penetration_m: f64,
-    pub(super) smallest_jacobian: Option<f64>,
+    /// What the last solve changed of the pressures' continuous part, as a share of the largest pressure.
+    pub(super) pressure_change: f64,
+    /// The same of tractions.
+    pub(super) traction_change: f64,
+    /// Largest force left at a free coordinate, as a share of the largest nodal force.
     pub(super) residual: f64,
+    pub(super) smallest_jacobian: Option<f64>,
 }
 
 /// Why an increment has no result.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Failure {
     Solve(SolveError),
-    /// The multipliers still moved after the last update.
+    /// Pressures still moved after the last update.
     Unsettled(Fit),
 }
 
 impl<'a> Increment<'a> {
-    /// Of the tool's motion to `pose`, from where it is in `state`.
-    pub(super) fn new(press: &'a Press<'a>, state: &ContactState, pose: &Isometry3<f64>) -> Self {
-        let ContactParams { young_modulus_pa, penalty_ratio, .. } = press.params;
-        let turned = pose.rotation * state.pose.rotation.inverse();
-        let anchors = state.anchors_at(pose, press.obstacle);
-        let row = |(anchor, traction): (_, &Vector3<f64>)| FrictionRow {
-            anchor,
-            normal: Vector3::z(),
-            multiplier_pa: turned * traction,
-            bound_pa: 0.0,
+    /// Of the tool's motion to `pose`, one of the path's or on the way to one, from where it is in `state`.
+    pub(super) fn new(press: &'a Press<'a>, state: &ContactState, pose: &Isometry3<f64>, is_on_the_way: bool) -> Self {
+        let ContactParams { young_modulus_pa, penalty_ratio, friction_penalty_ratio, .. } = press.params;
+        let [looser_pressures, looser_forces] = if is_on_the_way { ON_THE_WAY } else { [1.0; 2] };
+        let penalties = |ratio: f64| {
+            let sizes = press.surface.points().iter().map(|point| point.size_m);
+            sizes.map(|size| ratio * young_modulus_pa / size).collect()
         };
-        let points = press.surface.points().iter();
+        let turned = pose.rotation * state.pose.rotation.inverse();
+        let row = |anchor| FrictionRow { anchor, normal: Vector3::z(), multiplier_pa: Vector3::zeros(), bound_pa: 0.0 };
         Self {
             press,
             pose: *pose,
-            penalties: points.map(|point| penalty_ratio * young_modulus_pa / point.size_m).collect(),
+            pressure_tolerance: looser_pressures * press.params.pressure_tolerance,
+            newton_tolerance: looser_forces * press.params.newton_tolerance,
+            penalties: penalties(penalty_ratio),
+            friction_penalties: penalties(friction_penalty_ratio),
             pressures: state.pressures_pa.clone(),
-            rows: anchors.into_iter().zip(&state.tractions_pa).map(row).collect(),
+            tractions: state.tractions_pa.iter().map(|traction| turned * traction).collect(),
+            multipliers: vec![0.0; state.pressures_pa.len()],
+            rows: state.anchors_at(pose, press.obstacle).into_iter().map(row).collect(),
         }
     }
 
-    /// Moves `x` to equilibrium with contact at the pose.
+    /// Moves `x` to equilibrium with contact at the pose; counts iterations in `work`.
     pub(super) fn solve(
         &mut self,
         solver: &mut Solver,
         x: &mut [Vector3<f64>],
-        work: &mut Work,
+        work: &mut ContactInfo,
         observer: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<Fit, Failure> {
-        let params = self.press.params;
-        let mut tolerance = params.first_newton_tolerance.max(params.newton_tolerance);
-        let mut fit = Fit::default();
-        for _ in 0..params.max_outer_iterations {
-            self.turn_rows(x);
+        let (mut fit, mut is_settled) = (Fit::default(), false);
+        for _ in 0..self.press.params.max_updates {
+            self.update_multipliers(x);
+            let tolerance = |residual: f64| if is_settled { 0.0 } else { LEFT_TO_NEXT * residual };
             let info = self.find_positions(solver, tolerance, x, work, observer).map_err(Failure::Solve)?;
-            fit = self.update_multipliers(x);
-            fit.smallest_jacobian = info.smallest_jacobian;
+            fit = self.find_pressures(x);
             fit.residual = info.residuals.last().copied().unwrap_or_default();
-            if fit.relative <= params.gap_tolerance && fit.residual <= params.newton_tolerance {
+            fit.smallest_jacobian = info.smallest_jacobian;
+            is_settled = fit.pressure_change.max(fit.traction_change) <= self.pressure_tolerance;
+            if is_settled && fit.residual <= self.newton_tolerance {
                 return Ok(fit);
             }
-            tolerance = (NEWTON_TIGHTENING * tolerance).max(params.newton_tolerance);
         }
         Err(Failure::Unsettled(fit))
     }
 
-    /// The tool is at the pose now.
+    /// The tool is at the pose now. A point that sticks keeps its anchor; one that slides gets the anchor that its traction
+    /// belongs to \[SH98, ch. 2\].
     pub(super) fn commit(&self, x: &[Vector3<f64>], state: &mut ContactState) {
-        state.pose = self.pose;
-        state.pressures_pa.copy_from_slice(&self.pressures);
+        let multipliers = self.press.surface.continuous_part(&self.tractions);
         for (q, row) in self.rows.iter().enumerate() {
-            state.tractions_pa[q] = row.multiplier_pa;
-            let holds = row.bound_pa > 0.0 && row.multiplier_pa.norm() < row.bound_pa;
-            let anchor = if holds { row.anchor } else { self.press.surface.points()[q].position(x) };
+            let (traction, position) = (self.tractions[q], self.press.surface.points()[q].position(x));
+            let anchor = if row.bound_pa <= 0.0 {
+                position
+            } else if traction.norm() < row.bound_pa {
+                row.anchor
+            } else {
+                position - (traction - row.along(&multipliers[q])) / self.friction_penalties[q]
+            };
             state.anchors[q] = self.pose.inverse_transform_point(&anchor);
         }
+        state.pose = self.pose;
+        state.pressures_pa.copy_from_slice(&self.pressures);
+        state.tractions_pa.copy_from_slice(&self.tractions);
+    }
+
+    /// The continuous parts of pressures and tractions become multipliers. Friction acts along the present tangent planes,
+    /// under the present pressures.
+    fn update_multipliers(&mut self, x: &[Vector3<f64>]) {
+        let Press { surface, obstacle, friction, .. } = *self.press;
+        self.multipliers = surface.continuous_part(&self.pressures);
+        let tractions = surface.continuous_part(&self.tractions);
+        for (q, row) in self.rows.iter_mut().enumerate() {
+            row.bound_pa = friction * self.pressures[q];
+            if row.bound_pa > 0.0 {
+                row.normal = obstacle.gap(&self.pose, &surface.points()[q].position(x)).normal;
+                row.multiplier_pa = row.along(&tractions[q]);
+            }
+        }
+    }
+
+    /// Solves with given multipliers until the residual is below `tolerance` of what it is at first, and not below the
+    /// press's own.
+    fn find_positions(
+        &self,
+        solver: &mut Solver,
+        tolerance: impl Fn(f64) -> f64,
+        x: &mut [Vector3<f64>],
+        work: &mut ContactInfo,
+        observer: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<Info, SolveError> {
+        let Press { surface, constraints, params, .. } = *self.press;
+        let normal = self.normal_contact();
+        let friction = Friction { surface, rows: &self.rows, penalties_pa_per_m: &self.friction_penalties };
+        let mut energies: Vec<&dyn Energy> = self.press.energies.to_vec();
+        energies.extend([&normal as &dyn Energy, &friction]);
+        let tolerance = tolerance(residual(&energies, constraints, x)).max(self.newton_tolerance);
+        let newton = Params { tolerance, max_iterations: params.max_newton_iterations };
+        let mut steps = 0;
+        let mut count = |progress: Progress| {
+            steps = progress.iteration;
+            observer(progress)
+        };
+        let result = solver.minimise(&energies, constraints, &newton, x, &mut count);
+        work.outer_iterations += 1;
+        work.newton_iterations += steps;
+        work.indefinite_steps += result.as_ref().map_or(0, |info| info.indefinite_steps);
+        result
     }
 
     fn normal_contact(&self) -> NormalContact<'_> {
@@ -118,67 +173,47 @@ impl<'a> Increment<'a> {
             surface: self.press.surface,
             obstacle: self.press.obstacle,
             pose: &self.pose,
-            multipliers_pa: &self.pressures,
+            multipliers_pa: &self.multipliers,
             penalties_pa_per_m: &self.penalties,
         }
     }
 
-    fn find_positions(
-        &self,
-        solver: &mut Solver,
-        tolerance: f64,
-        x: &mut [Vector3<f64>],
-        work: &mut Work,
-        observer: &mut dyn FnMut(Progress) -> ControlFlow<()>,
-    ) -> Result<Info, SolveError> {
+    /// Pressures and tractions at `x`.
+    fn find_pressures(&mut self, x: &[Vector3<f64>]) -> Fit {
+        let surface = self.press.surface;
         let normal = self.normal_contact();
-        let friction = Friction { surface: self.press.surface, rows: &self.rows, penalties_pa_per_m: &self.penalties };
-        let mut energies: Vec<&dyn Energy> = self.press.energies.to_vec();
-        energies.push(&normal);
-        energies.push(&friction);
-        let params = Params { tolerance, max_iterations: self.press.params.max_newton_iterations };
-        work.outer_iterations += 1;
-        let mut last = 0;
-        let mut watch = |progress: Progress| {
-            last = progress.iteration;
-            observer(progress)
+        let pressures: Vec<f64> = (0..self.pressures.len()).map(|q| normal.pressure(q, x).0).collect();
+        let traction = |(q, row): (usize, &FrictionRow)| {
+            row.traction(self.friction_penalties[q], &surface.points()[q].position(x)).0
         };
-        let result = solver.minimise(&energies, self.press.constraints, &params, x, &mut watch);
-        work.newton_iterations += last;
-        work.indefinite_steps += result.as_ref().map_or(0, |info| info.indefinite_steps);
-        result
-    }
-
-    /// Friction acts along the present tangent planes, under the present pressures.
-    fn turn_rows(&mut self, x: &[Vector3<f64>]) {
-        for (q, row) in self.rows.iter_mut().enumerate() {
-            row.bound_pa = self.press.friction * self.pressures[q];
-            if row.bound_pa > 0.0 {
-                let position = self.press.surface.points()[q].position(x);
-                row.normal = self.press.obstacle.gap(&self.pose, &position).normal;
-                row.multiplier_pa -= row.normal * row.normal.dot(&row.multiplier_pa);
-            }
-        }
-    }
-
-    /// `l <- p` and, for friction, `l <- t`.
-    fn update_multipliers(&mut self, x: &[Vector3<f64>]) -> Fit {
-        let mut fit = Fit::default();
-        for q in 0..self.pressures.len() {
-            let (penalty, point) = (self.penalties[q], &self.press.surface.points()[q]);
-            let (pressure, gap) = self.normal_contact().pressure(q, x);
-            let row = &mut self.rows[q];
-            let (traction, _) = row.traction(penalty, &point.position(x));
-            let excess = (traction.norm() - self.press.friction * pressure).max(0.0);
-            let complementarity = (pressure - self.pressures[q]).abs() / penalty;
-            let friction = ((traction - row.multiplier_pa).norm() / penalty).max(excess / penalty);
-            row.multiplier_pa = traction;
-            self.pressures[q] = pressure;
-            fit.complementarity_m = fit.complementarity_m.max(complementarity);
-            fit.friction_m = fit.friction_m.max(friction);
-            fit.relative = fit.relative.max(complementarity.max(friction) / point.size_m);
-            fit.penetration_m = fit.penetration_m.max(-gap.distance_m);
-        }
+        let tractions: Vec<_> = self.rows.iter().enumerate().map(traction).collect();
+        let largest = pressures.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        let changed: Vec<_> = pressures.iter().zip(&self.pressures).map(|(new, old)| new - old).collect();
+        let turned: Vec<_> = tractions.iter().zip(&self.tractions).map(|(new, old)| new - old).collect();
+        let fit = Fit {
+            pressure_change: surface.continuous_part(&changed).iter().fold(0.0, |m: f64, c| m.max(c.abs())) / largest,
+            traction_change: surface.continuous_part(&turned).iter().fold(0.0, |m: f64, c| m.max(c.norm())) / largest,
+            ..Fit::default()
+        };
+        (self.pressures, self.tractions) = (pressures, tractions);
         fit
     }
+}
+
+/// Largest force at a free coordinate, as a share of the largest nodal force of any single energy.
+fn residual(energies: &[&dyn Energy], constraints: &Constraints, x: &[Vector3<f64>]) -> f64 {
+    let zeros = || vec![Vector3::zeros(); x.len()];
+    let (mut sum, mut largest) = (zeros(), 0.0_f64);
+    for energy in energies {
+        let mut single = zeros();
+        energy.add_gradient(x, &mut single);
+        largest = single.iter().map(Vector3::norm).fold(largest, f64::max);
+        sum.iter_mut().zip(single).for_each(|(sum, force): (&mut Vector3<f64>, _)| *sum += force);
+    }
+    let free = |(node, force): (usize, &Vector3<f64>)| {
+        let given = constraints.is_given(node);
+        Vector3::from_fn(|k, _| if given[k] { 0.0 } else { force[k] }).norm()
+    };
+    let left = sum.iter().enumerate().map(free).fold(0.0, f64::max);
+    if left == 0.0 { 0.0 } else { left / largest }
 }

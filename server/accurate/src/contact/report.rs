@@ -1,31 +1,36 @@
-//! What contact does to the tool.
+//! What contact does to the tool, and how exactly its law holds.
 
 use nalgebra::{Point3, Vector3};
 
+use super::outcome::ContactInfo;
 use super::press::Press;
 use super::state::ContactState;
 
-/// Sums over the contact points.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Resultant {
-    pub(super) force_n: Vector3<f64>,
-    pub(super) torque_nm: Vector3<f64>,
-    pub(super) area_m2: f64,
-    pub(super) n_touching: usize,
-}
-
-/// Force on the tool, `sum A (t - p n)`, and its torque about the tool's origin.
-pub(super) fn resultant(press: &Press<'_>, state: &ContactState, x: &[Vector3<f64>]) -> Resultant {
+/// Fills in what can be read off the contact points: force on the tool `sum A (t - p n)`, its torque, area, and errors.
+pub(super) fn report(press: &Press<'_>, state: &ContactState, x: &[Vector3<f64>], info: ContactInfo) -> ContactInfo {
     let origin = Point3::from(state.pose.translation.vector);
-    let mut sum = Resultant::default();
-    for (q, point) in press.surface.points().iter().enumerate().filter(|(q, _)| state.pressures_pa[*q] > 0.0) {
+    let mut info = info;
+    let (mut gaps, mut pressures, mut largest) = (0.0, 0.0, 0.0_f64);
+    for (q, point) in press.surface.points().iter().enumerate() {
+        let (pressure, traction) = (state.pressures_pa[q], state.tractions_pa[q]);
         let position = point.position(x);
-        let normal = press.obstacle.gap(&state.pose, &position).normal;
-        let force = (state.tractions_pa[q] - normal * state.pressures_pa[q]) * point.area_m2;
-        sum.force_n += force;
-        sum.torque_nm += (position - origin).cross(&force);
-        sum.area_m2 += point.area_m2;
-        sum.n_touching += 1;
+        let gap = press.obstacle.gap(&state.pose, &position);
+        info.max_penetration_m = info.max_penetration_m.max(-gap.distance_m);
+        let force = (traction - gap.normal * pressure) * point.area_m2;
+        info.force_n += force;
+        info.torque_nm += (position - origin).cross(&force);
+        if pressure > 0.0 {
+            info.area_m2 += point.area_m2;
+            info.n_touching += 1;
+            gaps += point.area_m2 * pressure * gap.distance_m.abs();
+            pressures += point.area_m2 * pressure;
+            largest = largest.max(pressure);
+        }
+        info.friction_excess = info.friction_excess.max(traction.norm() - press.friction * pressure);
     }
-    sum
+    if largest > 0.0 {
+        info.mean_gap_m = gaps / pressures;
+        info.friction_excess /= largest;
+    }
+    info
 }

@@ -1,5 +1,7 @@
 //! Where contact is looked for: quadrature points on boundary faces.
 
+use std::ops::{Add, Mul, Sub};
+
 use nalgebra::{Point3, Vector3};
 use plica_geometry::{HexMesh, NodeIdx};
 
@@ -29,16 +31,34 @@ impl ContactPoint {
     }
 }
 
+/// What a field on the surface may consist of.
+pub(super) trait FieldValue:
+    Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<f64, Output = Self>
+{
+}
+
+impl FieldValue for f64 {}
+impl FieldValue for Vector3<f64> {}
+
 /// The 2 x 2 Gauss points of faces. Each lies in the stencil of one element, so contact adds nothing to its pattern.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactSurface {
     points: Vec<ContactPoint>,
+    /// `sum_q A_q N_a(q)`, `[n_nodes]` \[m^2\]; 0 off the surface.
+    node_areas_m2: Vec<f64>,
 }
 
 impl ContactSurface {
     /// Points of `quads`, whose reference positions are those of `mesh`.
     pub fn new(mesh: &HexMesh, quads: &[[NodeIdx; 4]]) -> Self {
-        Self { points: quads.iter().flat_map(|quad| face_points(mesh, *quad)).collect() }
+        let points: Vec<_> = quads.iter().flat_map(|quad| face_points(mesh, *quad)).collect();
+        let mut node_areas_m2 = vec![0.0; mesh.n_nodes()];
+        for point in &points {
+            for (node, share) in point.nodes.iter().zip(point.shares) {
+                node_areas_m2[node.index()] += point.area_m2 * share;
+            }
+        }
+        Self { points, node_areas_m2 }
     }
 
     /// Points of all boundary faces of `mesh` that are not given altogether.
@@ -51,6 +71,29 @@ impl ContactSurface {
     /// The points, four per face.
     pub fn points(&self) -> &[ContactPoint] {
         &self.points
+    }
+
+    /// `P v = S (2 v - S v)`, the part of `values: [n_points]` that is continuous over the surface. Rows of `S` average:
+    /// `v_a = sum_q A_q N_a v_q / sum_q A_q N_a` at the nodes, interpolated back to the points.
+    pub(super) fn continuous_part<T: FieldValue>(&self, values: &[T]) -> Vec<T> {
+        let averaged = self.average(values);
+        let sharpened: Vec<T> = values.iter().zip(averaged).map(|(v, average)| *v * 2.0 - average).collect();
+        self.average(&sharpened)
+    }
+
+    fn average<T: FieldValue>(&self, values: &[T]) -> Vec<T> {
+        let mut at_nodes = vec![T::default(); self.node_areas_m2.len()];
+        for (point, value) in self.points.iter().zip(values) {
+            for (node, share) in point.nodes.iter().zip(point.shares) {
+                let weight = point.area_m2 * share / self.node_areas_m2[node.index()];
+                at_nodes[node.index()] = at_nodes[node.index()] + *value * weight;
+            }
+        }
+        let interpolate = |point: &ContactPoint| {
+            let shares = point.nodes.iter().zip(point.shares);
+            shares.fold(T::default(), |sum, (node, share)| sum + at_nodes[node.index()] * share)
+        };
+        self.points.iter().map(interpolate).collect()
     }
 
     /// Calls `visit` with the nodes of every face.

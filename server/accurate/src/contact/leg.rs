@@ -1,0 +1,64 @@
+//! One leg of a tool's path, in increments that are halved where they fail.
+
+use nalgebra::Isometry3;
+
+/// From one pose to the next: `n_increments` whole increments, of which `done` are behind.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Leg {
+    from: Isometry3<f64>,
+    to: Isometry3<f64>,
+    n_increments: f64,
+    done: f64,
+    halvings: u32,
+}
+
+impl Leg {
+    pub(super) fn new(from: &Isometry3<f64>, to: &Isometry3<f64>, motion_m: f64, max_increment_m: f64) -> Self {
+        let n_increments = (motion_m / max_increment_m).ceil().max(1.0);
+        Self { from: *from, to: *to, n_increments, done: 0.0, halvings: 0 }
+    }
+
+    pub(super) fn is_over(&self) -> bool {
+        self.done >= self.n_increments
+    }
+
+    /// Length of the next increment, in whole ones.
+    pub(super) fn step(&self) -> f64 {
+        0.5_f64.powi(self.halvings as i32)
+    }
+
+    pub(super) fn halvings(&self) -> u32 {
+        self.halvings
+    }
+
+    /// Share of the leg that is behind.
+    pub(super) fn share(&self) -> f64 {
+        self.done / self.n_increments
+    }
+
+    /// Share of the leg that the next increment ends at.
+    pub(super) fn next_share(&self) -> f64 {
+        (self.done + self.step()) / self.n_increments
+    }
+
+    /// Where the next increment ends: straight from one origin to the other, turning evenly.
+    pub(super) fn target(&self) -> Isometry3<f64> {
+        if self.next_share() >= 1.0 {
+            return self.to;
+        }
+        self.from.try_lerp_slerp(&self.to, self.next_share(), 1e-12).unwrap_or(self.to)
+    }
+
+    /// The next increment is behind. Halved ones grow again where a longer one would begin.
+    pub(super) fn advance(&mut self) {
+        self.done += self.step();
+        while self.halvings > 0 && (self.done / (2.0 * self.step())).fract() == 0.0 {
+            self.halvings -= 1;
+        }
+    }
+
+    /// The next increment is tried again at half its length.
+    pub(super) fn halve(&mut self) {
+        self.halvings += 1;
+    }
+}
