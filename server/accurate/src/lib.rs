@@ -22,6 +22,7 @@ mod tie;
 
 pub use constraints::Constraints;
 pub use energy::{Energy, Projection};
+pub use factor::FactorError;
 pub use hessian::Hessian;
 pub use loads::{NodalForces, Pressure, Traction};
 pub use material::{Lame, Material, MaterialError, MaterialModel};
