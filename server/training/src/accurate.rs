@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use nalgebra::Vector3;
-use plica_accurate::contact::{ContactError, ContactParams, ContactState, ContactSurface, Obstacle, Press, press};
+use plica_accurate::contact::{ContactError, ContactParams, ContactState, ContactSurface, Obstacle, Press};
 use plica_accurate::{Constraints, Energy, NodalForces, Params, Progress, Solid, SolveError, Solver, Tie, reactions};
 use plica_geometry::{Embedding, EmbeddingKind, HexIdx, HexMesh, NodeIdx, Skin, isoparametric};
 use serde::{Deserialize, Serialize};
@@ -178,7 +178,7 @@ impl Accurate {
             params: self.contact,
         };
         let mut watch = |_| stop_if(cancelled());
-        let info = press(&setting, path, &mut self.solver, &mut state, &mut x, &mut watch).map_err(|e| match e {
+        let info = setting.follow(path, &mut self.solver, &mut state, &mut x, &mut watch).map_err(|e| match e {
             ContactError::Cancelled { .. } => AccurateFailure::Interrupted,
             other => AccurateFailure::Failed(other.to_string()),
         })?;

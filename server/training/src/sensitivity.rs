@@ -4,6 +4,7 @@
 //! and coarser meshes, with softer and stiffer ties, and with contact of its own.
 
 use nalgebra::Vector3;
+use plica_accurate::TieOptions;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -16,6 +17,9 @@ use crate::reference::ReferenceSkin;
 use crate::report::Spread;
 use crate::setup::{AccurateDescription, InteractionSet, Setup};
 use crate::tandem::{CoarseHalf, Stop, Tandem};
+
+/// Vertices with this share of the tie's stiffness or more count as the imprint.
+const HELD: f64 = 0.01;
 
 /// What is varied.
 #[derive(Debug, Clone)]
@@ -118,7 +122,7 @@ pub fn sensitivity(
         }
     }
     let skin = ReferenceSkin::new(&setup.coarse.skin);
-    let compared = Comparison { areas: skin.vertex_areas(), halves: &halves };
+    let compared = Comparison { tie: &setup.tie, areas: skin.vertex_areas(), halves: &halves };
     let mut differences = compared.to_last("accurate mesh", &meshes);
     differences.extend(compared.to_last("accurate mesh", &own_meshes));
     differences.extend(ties.iter().filter_map(|tie| compared.between("tie stiffness", tie, &tied, false)));
@@ -204,6 +208,7 @@ fn keep<T>(
 
 /// Compares skins.
 struct Comparison<'a> {
+    tie: &'a TieOptions,
     areas: &'a [f64],
     halves: &'a [Option<CoarseHalf>],
 }
@@ -237,8 +242,9 @@ impl Comparison<'_> {
     ) -> Option<Difference> {
         let (mut rms, mut worst) = (Vec::new(), Vec::new());
         for (a, b, half) in skins {
-            let band: Vec<usize> = half.targets.iter().map(|t| t.vertex.index()).collect();
-            let vertices = if in_band { band } else { (0..a.len()).collect() };
+            let held = half.targets.iter().filter(|t| self.tie.share(t.gap_m) >= HELD);
+            let vertices: Vec<usize> =
+                if in_band { held.map(|t| t.vertex.index()).collect() } else { (0..a.len()).collect() };
             let area: f64 = vertices.iter().map(|&v| self.areas[v]).sum();
             let squared: f64 = vertices.iter().map(|&v| self.areas[v] * (a[v] - b[v]).norm_squared()).sum();
             rms.push((squared / area).sqrt());
