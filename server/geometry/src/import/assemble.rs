@@ -8,6 +8,7 @@ use super::error::{Fault, Place, fault};
 use super::{Group, Groups, NamedMesh};
 use crate::hex_mesh::{HexMesh, MeshError};
 use crate::index::{HexIdx, NodeIdx};
+use crate::isoparametric;
 
 /// What is left of a file once its format is forgotten.
 #[derive(Debug, Default)]
@@ -134,13 +135,26 @@ impl Content {
             MeshError::NonFinite { .. } => super::error::DAMAGED,
             _ => "mend the mesh: every face belongs to one or two hexahedra",
         };
-        let place = match error {
+        let (place, count) = match error {
             MeshError::Inverted { hex, .. } => {
-                Place::Field(format!("cell {}", self.cells[numbers[hex.index()]].number), None)
+                let cell = format!("cell {}", self.cells[numbers[hex.index()]].number);
+                (
+                    Place::Field(cell, None),
+                    format!(" ({} of {} hexahedra)", self.count_inverted(numbers), numbers.len()),
+                )
             }
-            _ => Place::File,
+            _ => (Place::File, String::new()),
         };
-        Fault::new(place, error.to_string(), advice)
+        Fault::new(place, format!("{error}{count}"), advice)
+    }
+
+    /// How many hexahedra are turned over at a corner.
+    fn count_inverted(&self, numbers: &[usize]) -> usize {
+        let is_inverted = |&&cell: &&usize| {
+            let corners = self.cells[cell].corners.map(|point| self.points[point as usize]);
+            isoparametric::CORNERS.iter().any(|&xi| isoparametric::jacobian(&corners, xi).determinant() <= 0.0)
+        };
+        numbers.iter().filter(is_inverted).count()
     }
 
     fn groups(&self, places: &Places) -> Groups {
