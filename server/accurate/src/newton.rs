@@ -17,8 +17,6 @@ use crate::hessian::Hessian;
 use acceptance::Total;
 pub use report::{Info, Params, Progress, SolveError};
 
-/// Residual at which given coordinates go on after a stop.
-const RELAXED: f64 = 1e-2;
 /// Forces below this share of stiffness times position are rounding.
 const FORCE_ROUNDING: f64 = 256.0 * f64::EPSILON;
 
@@ -89,9 +87,9 @@ impl Solver {
 
     /// Moves `x: [n_nodes]` \[m\] to a minimum of the sum of `energies` where `constraints` hold.
     ///
-    /// Given coordinates travel to their targets with the first steps, the free ones following linearly; where the energy
-    /// would not be finite they stop on the way until the free ones have come to rest. The exact Hessian is used where it is
-    /// positive definite, else a projected one \[SGK19\]. `observer` is called before every step and may cancel.
+    /// Given coordinates travel to their targets with the first steps, as far as the energy stays finite, the free ones
+    /// following linearly. The exact Hessian is used where it is positive definite, else a projected one \[SGK19\]. `observer`
+    /// is called before every step and may cancel.
     ///
     /// # Errors
     /// See [`SolveError`].
@@ -112,26 +110,21 @@ impl Solver {
             return Err(SolveError::NotFinite { iterations: 0 });
         }
         let mut info = Info::default();
-        // After a step that given coordinates could not go to its end, the free ones come to rest first.
-        let mut is_relaxing = false;
         loop {
-            let is_on_its_way = self.find_motion(constraints, x);
+            let moves = self.find_motion(constraints, x);
             let residual = self.find_residual(&problem, x);
             info.residuals.push(residual.relative);
-            if is_done(&problem, &info, is_on_its_way, observer)? {
+            if is_done(&problem, &info, moves, observer)? {
                 break;
             }
-            is_relaxing &= residual.relative > RELAXED;
-            let moves = is_on_its_way && !is_relaxing;
-            let length = self.step(&problem, moves, residual, x, &mut info)?;
-            is_relaxing |= moves && length < 1.0;
+            self.step(&problem, moves, residual, x, &mut info)?;
             info.iterations += 1;
         }
         info.smallest_jacobian = energies.iter().filter_map(|e| e.smallest_jacobian(x)).reduce(f64::min);
         Ok(info)
     }
 
-    /// One Newton step, with given coordinates `moves` or not; the share of it that was taken.
+    /// One Newton step. While given coordinates still move, the free ones follow linearly whatever the energy says.
     fn step(
         &mut self,
         problem: &Problem<'_>,
@@ -139,14 +132,12 @@ impl Solver {
         residual: Residual,
         x: &mut [Vector3<f64>],
         info: &mut Info,
-    ) -> Result<f64, SolveError> {
-        if !moves {
-            self.motion.fill(Vector3::zeros());
-        }
+    ) -> Result<(), SolveError> {
         self.find_direction(problem, moves, x, info)?;
-        let length =
+        let went =
             if moves { self.follow_given(problem, x, info) } else { self.search_line(problem, residual, x, info) };
-        length.ok_or(SolveError::LineSearch { iterations: info.iterations, residual: residual.relative })
+        let (iterations, residual) = (info.iterations, residual.relative);
+        went.then_some(()).ok_or(SolveError::LineSearch { iterations, residual })
     }
 
     /// What given coordinates still have to move; whether any has.
@@ -183,7 +174,7 @@ impl Solver {
 fn is_done(
     problem: &Problem<'_>,
     info: &Info,
-    is_on_its_way: bool,
+    moves: bool,
     observer: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<bool, SolveError> {
     let Params { tolerance, max_iterations } = *problem.params;
@@ -194,7 +185,7 @@ fn is_done(
     if observer(Progress { iteration: iterations, residual }).is_break() {
         return Err(SolveError::Cancelled { iterations });
     }
-    let is_done = !is_on_its_way && residual <= tolerance;
+    let is_done = !moves && residual <= tolerance;
     if !is_done && iterations == max_iterations {
         return Err(SolveError::NotConverged { iterations, residual, tolerance });
     }

@@ -10,13 +10,8 @@ const SLOPE_LEFT: f64 = 0.9;
 const MAX_HALVINGS: u32 = 30;
 
 impl Solver {
-    /// Takes the longest step at which the energy is finite, and returns its length.
-    pub(super) fn follow_given(
-        &mut self,
-        problem: &Problem<'_>,
-        x: &mut [Vector3<f64>],
-        info: &mut Info,
-    ) -> Option<f64> {
+    /// Takes the longest step at which the energy is finite.
+    pub(super) fn follow_given(&mut self, problem: &Problem<'_>, x: &mut [Vector3<f64>], info: &mut Info) -> bool {
         let mut length = 1.0;
         for _ in 0..=MAX_HALVINGS {
             self.try_step(x, length);
@@ -25,22 +20,22 @@ impl Solver {
             }
             if Total::of(problem.energies, &self.trial).value.is_finite() {
                 x.copy_from_slice(&self.trial);
-                return Some(length);
+                return true;
             }
             info.halvings += 1;
             length *= 0.5;
         }
-        None
+        false
     }
 
-    /// Backtracks until the energy has fallen enough or, where its differences are rounding, the slope has; the length reached.
+    /// Backtracks until the energy has fallen enough or, where its differences are rounding, the slope has.
     pub(super) fn search_line(
         &mut self,
         problem: &Problem<'_>,
         residual: Residual,
         x: &mut [Vector3<f64>],
         info: &mut Info,
-    ) -> Option<f64> {
+    ) -> bool {
         let start = Start {
             total: Total::of(problem.energies, x),
             slope: dot(&self.gradient, &self.direction),
@@ -58,12 +53,12 @@ impl Solver {
             };
             if accepted {
                 x.copy_from_slice(&self.trial);
-                return Some(length);
+                return true;
             }
             info.halvings += 1;
             length *= 0.5;
         }
-        None
+        false
     }
 
     /// Work against the loads that have no potential, held as they are, along the whole step \[J\].
