@@ -29,7 +29,7 @@ pub struct Settling {
     pub motion_m: f64,
     /// Speed of the fastest node at the end \[m/s\].
     pub speed_m_per_s: f64,
-    /// Whether it settled within the patience.
+    /// Whether that is little enough.
     pub settled: bool,
     /// States that had to be rolled back.
     pub rollbacks: u64,
@@ -138,7 +138,7 @@ impl Coarse {
         Ok(())
     }
 
-    /// Holds until no node has moved farther than `settled_m` within a window.
+    /// Holds until no node has moved farther than `settled_m` within a window, as long as patience lasts.
     fn settle(
         &mut self,
         pose: Option<(usize, Isometry3<f64>)>,
@@ -161,7 +161,7 @@ impl Coarse {
             time_s: waited as f64 * self.model.timestep_s(),
             motion_m,
             speed_m_per_s: largest(self.state.node_velocities(&self.model).iter().map(Vector3::norm)),
-            settled: motion_m <= drive.settled_m,
+            settled: motion_m <= drive.tolerated_m.max(drive.settled_m),
             rollbacks: self.state.rollbacks(),
         })
     }

@@ -60,11 +60,13 @@ pub struct DriveOptions {
     pub window_s: f64,
     /// Longest wait for that \[s\].
     pub patience_s: f64,
+    /// What is not settled by then is rejected if a node still moves farther than this within the window \[m\].
+    pub tolerated_m: f64,
 }
 
 impl Default for DriveOptions {
     fn default() -> Self {
-        Self { speed_m_per_s: 0.05, mass_damping_per_s: 50.0, settled_m: 2e-6, window_s: 0.1, patience_s: 4.0 }
+        Self { speed_m_per_s: 0.05, mass_damping_per_s: 50.0, settled_m: 2e-6, window_s: 0.1, patience_s: 4.0, tolerated_m: 2e-5 }
     }
 }
 

@@ -175,7 +175,7 @@ fn a_job_without_an_example_fails_and_says_why() {
     let mut setup = common::tiny();
     setup.drive.patience_s = 0.01;
     setup.drive.window_s = 0.01;
-    setup.drive.settled_m = 0.0;
+    (setup.drive.settled_m, setup.drive.tolerated_m) = (0.0, 0.0);
     let folder = TempDir::new().unwrap();
     let message = train(&setup, &folder, JobKind::Training, 1, &Counting::patient()).unwrap_err().to_string();
     assert!(message.contains("all 4 interactions were rejected") && message.contains("moves by"), "{message}");

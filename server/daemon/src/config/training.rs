@@ -180,6 +180,7 @@ fn check_drive(c: &Check<'_>, key: &str, raw: &RawDrive) -> Result<DriveOptions,
         settled_m: number("settled_m", raw.settled_m, 1e-8, 0.01)?,
         window_s: number("window_s", raw.window_s, 1e-3, 10.0)?,
         patience_s: number("patience_s", raw.patience_s, 0.01, 600.0)?,
+        tolerated_m: number("tolerated_m", raw.tolerated_m, 1e-8, 0.01)?,
     })
 }
 

@@ -136,8 +136,10 @@ pub struct RawDrive {
     pub settled_m: f64,
     /// ... within this time [s], 0.001 to 10.
     pub window_s: f64,
-    /// Longest wait for that; longer, and the interaction is rejected [s], 0.01 to 600.
+    /// Longest wait for that [s], 0.01 to 600.
     pub patience_s: f64,
+    /// What is not settled by then is rejected if a node still moves farther than this within the window [m], 1e-8 to 0.01.
+    pub tolerated_m: f64,
 }
 
 /// Interactions that are never trained on.
@@ -225,6 +227,7 @@ impl Default for RawDrive {
             settled_m: d.settled_m,
             window_s: d.window_s,
             patience_s: d.patience_s,
+            tolerated_m: d.tolerated_m,
         }
     }
 }
