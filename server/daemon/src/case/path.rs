@@ -102,11 +102,9 @@ pub fn follow(
     options: &SolveOptions,
     observer: &mut dyn FnMut(News) -> ControlFlow<()>,
 ) -> Result<Solution, Failure> {
+    let mut path = Path::new(problem, options)?;
+    let (n_unknowns, n_factor_values) = path.solver.size();
     let mut x: Vec<_> = problem.mesh().nodes().iter().map(|node| node.coords).collect();
-    let loads = problem.loads_at(1.0);
-    let mut solver =
-        Solver::new(&problem.constraints_at(1.0), &energies(problem.solid(), &loads)).map_err(SolveError::from)?;
-    let (n_unknowns, n_factor_values) = solver.size();
     let largest_step = 1.0 / f64::from(options.steps);
     let least_step = largest_step * 0.5_f64.powi(options.max_halvings as i32);
     let (mut reached, mut step, mut n_failed, mut steps) = (0.0, largest_step, 0, Vec::new());
@@ -114,7 +112,7 @@ pub fn follow(
         // What rounding would leave for one more step is taken along.
         let target = if reached + 1.01 * step >= 1.0 { 1.0 } else { reached + step };
         let mut trial = x.clone();
-        match attempt(problem, options, &mut solver, [reached, target], &mut trial, observer) {
+        match path.attempt([reached, target], &mut trial, observer) {
             Ok(info) => {
                 steps.push(LoadStep::new(target, info));
                 (x, reached) = (trial, target);
@@ -131,20 +129,35 @@ pub fn follow(
     Ok(Solution { x, steps, n_failed, n_unknowns, n_factor_values })
 }
 
-fn attempt(
-    problem: &Problem,
-    options: &SolveOptions,
-    solver: &mut Solver,
-    [reached, target]: [f64; 2],
-    x: &mut [Vector3<f64>],
-    observer: &mut dyn FnMut(News) -> ControlFlow<()>,
-) -> Result<Info, SolveError> {
-    let loads = problem.loads_at(target);
-    let params = Params { tolerance: options.tolerance, max_iterations: options.max_iterations };
-    let mut tell = |progress: plica_accurate::Progress| {
-        observer(News { reached, target, iteration: progress.iteration, residual: progress.residual })
-    };
-    solver.minimise(&energies(problem.solid(), &loads), &problem.constraints_at(target), &params, x, &mut tell)
+/// What all load steps share.
+struct Path<'a> {
+    problem: &'a Problem,
+    params: Params,
+    solver: Solver,
+}
+
+impl<'a> Path<'a> {
+    fn new(problem: &'a Problem, options: &SolveOptions) -> Result<Self, SolveError> {
+        let loads = problem.loads_at(1.0);
+        let solver = Solver::new(&problem.constraints_at(1.0), &energies(problem.solid(), &loads))?;
+        let params = Params { tolerance: options.tolerance, max_iterations: options.max_iterations };
+        Ok(Self { problem, params, solver })
+    }
+
+    /// Moves `x` from the equilibrium under one share of the loads to that under another.
+    fn attempt(
+        &mut self,
+        [reached, target]: [f64; 2],
+        x: &mut [Vector3<f64>],
+        observer: &mut dyn FnMut(News) -> ControlFlow<()>,
+    ) -> Result<Info, SolveError> {
+        let loads = self.problem.loads_at(target);
+        let energies = energies(self.problem.solid(), &loads);
+        let mut tell = |progress: plica_accurate::Progress| {
+            observer(News { reached, target, iteration: progress.iteration, residual: progress.residual })
+        };
+        self.solver.minimise(&energies, &self.problem.constraints_at(target), &self.params, x, &mut tell)
+    }
 }
 
 impl LoadStep {

@@ -132,7 +132,7 @@ impl ProbeSpec {
             Target::DisplacementNearest(x) => Sensor::Displacement(vec![(nearest_node(mesh, x), 1.0)]),
             Target::DisplacementOver(selector) => {
                 let nodes = selector.nodes(&mesh.mesh, &mesh.groups);
-                let nodes = nodes.map_err(|e| select::explain(document, &format!("{key}.select"), &e))?;
+                let nodes = nodes.map_err(|e| select::explain(document, &format!("{key}.select"), &mesh.mesh, &e))?;
                 let share = 1.0 / nodes.len() as f64;
                 Sensor::Displacement(nodes.into_iter().map(|node| (node, share)).collect())
             }
@@ -154,8 +154,7 @@ fn find(document: &Document, key: &str, mesh: &NamedMesh, x: &Point3<f64>) -> Re
     match locate(&mesh.mesh, x, reach) {
         Some(found) => Ok(Location { xi: found.xi.map(|c| c.clamp(-1.0, 1.0)), ..found }),
         None => {
-            let (l, u): ([f64; 3], [f64; 3]) = (lower.coords.into(), upper.coords.into());
-            let problem = format!("lies outside the body at rest, whose bounding box is {l:?} to {u:?} m");
+            let problem = format!("lies outside the body at rest, which spans {}", select::extent(&mesh.mesh));
             Err(document.error(&format!("{key}.at_m"), problem, "give a point inside, or nearest_to_m for a node"))
         }
     }

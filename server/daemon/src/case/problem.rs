@@ -1,6 +1,6 @@
 //! A case whose selections are found: what is solved.
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use plica_accurate::{Constraints, Energy, Material, MaterialModel, NodalForces, Pressure, Solid, Traction, reactions};
 use plica_geometry::import::NamedMesh;
 use plica_geometry::{HexMesh, NodeIdx};
@@ -141,7 +141,7 @@ fn make_solid(case: &Case, mesh: &NamedMesh) -> Result<(Solid, Vec<usize>), Conf
     for (i, region) in case.regions.iter().enumerate() {
         let hexes = region.selector.hexes(&mesh.mesh, &mesh.groups);
         let key = format!("regions.{i}.select");
-        for hex in hexes.map_err(|e| select::explain(&case.document, &key, &e))? {
+        for hex in hexes.map_err(|e| select::explain(&case.document, &key, &mesh.mesh, &e))? {
             materials[hex.index()] = region.material;
             region_of_hex[hex.index()] = i + 1;
         }
@@ -158,7 +158,7 @@ fn find_supports(document: &Document, specs: &[SupportSpec], mesh: &NamedMesh) -
     let mut supports = Vec::with_capacity(specs.len());
     for (i, spec) in specs.iter().enumerate() {
         let nodes = spec.selector.nodes(&mesh.mesh, &mesh.groups);
-        let nodes = nodes.map_err(|e| select::explain(document, &format!("supports.{i}.select"), &e))?;
+        let nodes = nodes.map_err(|e| select::explain(document, &format!("supports.{i}.select"), &mesh.mesh, &e))?;
         let mut held = Vec::with_capacity(nodes.len());
         for node in nodes {
             let mut axes = [false; 3];
@@ -169,7 +169,10 @@ fn find_supports(document: &Document, specs: &[SupportSpec], mesh: &NamedMesh) -
                         axes[k] = true;
                     }
                     Some(first) if specs[first].displacement_m[k] == spec.displacement_m[k] => {}
-                    Some(first) => return Err(contradiction(document, i, k, [&specs[first], spec], mesh, node)),
+                    Some(first) => {
+                        let (key, at) = (format!("supports.{i}"), &mesh.mesh.nodes()[node.index()]);
+                        return Err(contradiction(document, &key, [&specs[first], spec], k, at));
+                    }
                 }
             }
             held.push((node, axes));
@@ -181,26 +184,20 @@ fn find_supports(document: &Document, specs: &[SupportSpec], mesh: &NamedMesh) -
 
 fn contradiction(
     document: &Document,
-    i: usize,
-    axis: usize,
+    key: &str,
     [first, second]: [&SupportSpec; 2],
-    mesh: &NamedMesh,
-    node: NodeIdx,
+    axis: usize,
+    at: &Point3<f64>,
 ) -> ConfigError {
-    let at: [f64; 3] = mesh.mesh.nodes()[node.index()].coords.into();
-    let problem = format!(
-        "`{}` moves the node at {at:?} m by {} m along {}, `{}` by {} m",
-        first.name,
-        first.displacement_m[axis],
-        ["x", "y", "z"][axis],
-        second.name,
-        second.displacement_m[axis]
-    );
-    document.error(&format!("supports.{i}"), problem, "let them select different nodes or axes")
+    let (at, along): ([f64; 3], _) = (at.coords.into(), ["x", "y", "z"][axis]);
+    let [one, other] = [first, second].map(|support| support.displacement_m[axis]);
+    let problem =
+        format!("`{}` moves the node at {at:?} m by {one} m along {along}, `{}` by {other} m", first.name, second.name);
+    document.error(key, problem, "let them select different nodes or axes")
 }
 
 fn find_load(document: &Document, key: &str, spec: &LoadSpec, mesh: &NamedMesh) -> Result<Load, ConfigError> {
-    let explain = |e| select::explain(document, &format!("{key}.select"), &e);
+    let explain = |e| select::explain(document, &format!("{key}.select"), &mesh.mesh, &e);
     let faces = spec.selector.faces(&mesh.mesh, &mesh.groups);
     Ok(match (spec.kind, faces) {
         (LoadKind::Traction(traction), faces) => Load::Traction(faces.map_err(explain)?, traction.into()),

@@ -1,5 +1,6 @@
 //! Which part of a mesh is meant.
 
+use plica_geometry::HexMesh;
 use plica_geometry::predicate::Predicate;
 use plica_geometry::select::{SelectError, Selector, Side};
 
@@ -39,13 +40,19 @@ fn side(face: RawFace) -> Side {
 }
 
 /// What a selector that selects nothing means to the person who wrote it.
-pub(super) fn explain(document: &Document, key: &str, error: &SelectError) -> ConfigError {
+pub(super) fn explain(document: &Document, key: &str, mesh: &HexMesh, error: &SelectError) -> ConfigError {
     let advice = match error {
-        SelectError::UnknownGroup { .. } => "take one of these, or name the part in the mesh file",
-        SelectError::NoVolume { .. } => "take a group of volumes",
+        SelectError::UnknownGroup { .. } => "take one of these, or name the part in the mesh file".to_owned(),
+        SelectError::NoVolume { .. } => "take a group of volumes".to_owned(),
         SelectError::Empty { .. } => {
-            "coordinates are in metres, of the body at rest; all conditions must hold together"
+            format!("all conditions must hold together; the body at rest spans {}", extent(mesh))
         }
     };
     document.error(key, error.to_string(), advice)
+}
+
+/// Lower and upper corner of the bounding box, for a message.
+pub(super) fn extent(mesh: &HexMesh) -> String {
+    let [lower, upper] = mesh.bounds().map(|x| format!("[{:.4e}, {:.4e}, {:.4e}]", x.x, x.y, x.z));
+    format!("{lower} to {upper} m")
 }

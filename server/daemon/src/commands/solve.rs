@@ -4,7 +4,6 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -59,7 +58,15 @@ pub fn run(args: &SolveArgs, json: bool) -> anyhow::Result<()> {
     }
     let readings = problem.probes().iter().map(|probe| (probe.name.clone(), probe.read(&problem, &solution)));
     let readings: Vec<(String, Reading)> = readings.collect();
-    let report = report(&case, &problem, &solution, &readings, args, begin.elapsed().as_secs_f64())?;
+    let as_json = |(name, reading): &(String, Reading)| Ok((name.clone(), serde_json::to_value(reading)?));
+    let report = Report {
+        case: case.name().to_owned(),
+        probes: readings.iter().map(as_json).collect::<anyhow::Result<_>>()?,
+        info: Info::new(&problem, &solution),
+        warnings: warnings(&problem, &solution),
+        wall_s: begin.elapsed().as_secs_f64(),
+        out: args.out.as_ref().map(|out| out.display().to_string()),
+    };
     print(&report, &readings);
     if json {
         println!("{}", serde_json::to_string(&report)?);
@@ -99,22 +106,9 @@ fn advise(failure: Failure, case: &Path) -> anyhow::Error {
     anyhow::anyhow!("{}: {failure}; {advice}", case.display())
 }
 
-fn report(
-    case: &Case,
-    problem: &Problem,
-    solution: &Solution,
-    readings: &[(String, Reading)],
-    args: &SolveArgs,
-    wall_s: f64,
-) -> anyhow::Result<Report> {
-    let mut probes = Map::new();
-    for (name, reading) in readings {
-        probes.insert(name.clone(), serde_json::to_value(reading).context(name.clone())?);
-    }
-    Ok(Report {
-        case: case.name().to_owned(),
-        probes,
-        info: Info {
+impl Info {
+    fn new(problem: &Problem, solution: &Solution) -> Self {
+        Self {
             n_hexes: problem.mesh().n_hexes(),
             n_nodes: problem.mesh().n_nodes(),
             n_unknowns: solution.n_unknowns,
@@ -124,11 +118,8 @@ fn report(
             failed_load_steps: solution.n_failed,
             smallest_jacobian: solution.smallest_jacobian(),
             load_steps: solution.steps.clone(),
-        },
-        warnings: warnings(problem, solution),
-        wall_s,
-        out: args.out.as_ref().map(|out| out.display().to_string()),
-    })
+        }
+    }
 }
 
 fn warnings(problem: &Problem, solution: &Solution) -> Vec<String> {
