@@ -66,7 +66,14 @@ pub struct DriveOptions {
 
 impl Default for DriveOptions {
     fn default() -> Self {
-        Self { speed_m_per_s: 0.05, mass_damping_per_s: 50.0, settled_m: 2e-6, window_s: 0.1, patience_s: 4.0, tolerated_m: 2e-5 }
+        Self {
+            speed_m_per_s: 0.05,
+            mass_damping_per_s: 50.0,
+            settled_m: 2e-6,
+            window_s: 0.1,
+            patience_s: 4.0,
+            tolerated_m: 2e-5,
+        }
     }
 }
 
