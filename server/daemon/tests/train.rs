@@ -232,7 +232,7 @@ fn a_disk_that_takes_no_more_fails_the_job_and_keeps_what_is_finished() {
         fs::metadata(place.path("other/examples/00000.safetensors")).unwrap().len()
     };
     let message = errors(&run(&(2 * example / 1024).to_string()));
-    assert!(message.contains("database.safetensors"), "{message}");
+    assert!(message.contains("database.safetensors") && message.contains("finished examples are kept"), "{message}");
     assert_eq!(fs::read_dir(place.path("job/examples")).unwrap().count(), 4, "finished examples are kept");
     let rest = summary(&place.train(&["block.toml", "--folder", "job", "--threads", "1", "--json"]));
     assert_eq!((&rest["run"]["resumed"], &rest["run"]["solved"]), (&4.into(), &0.into()));

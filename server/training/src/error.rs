@@ -1,5 +1,6 @@
 //! Why nothing was trained.
 
+use std::io::ErrorKind;
 use std::path::PathBuf;
 
 use plica_accurate::contact::PolytopeError;
@@ -75,7 +76,7 @@ pub enum TrainingError {
     #[error(transparent)]
     Build(#[from] BuildError),
     /// A file of the job cannot be written or read. Finished examples are kept.
-    #[error("{path}: {source}", path = path.display())]
+    #[error("{path}: {source}{advice}", path = path.display(), advice = advice(source))]
     Io {
         /// The file.
         path: PathBuf,
@@ -101,4 +102,14 @@ pub enum TrainingError {
         /// What the system said.
         reason: String,
     },
+}
+
+/// What to do about a full disk.
+fn advice(error: &std::io::Error) -> &'static str {
+    match error.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
+            "; make room and run the job again: finished examples are kept"
+        }
+        _ => "",
+    }
 }

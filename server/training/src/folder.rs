@@ -251,7 +251,7 @@ struct StoredRejection {
     rejection: Rejection,
 }
 
-fn from_database(error: DatabaseError, path: &Path) -> TrainingError {
+pub(crate) fn from_database(error: DatabaseError, path: &Path) -> TrainingError {
     match error {
         DatabaseError::Io { path, source } => TrainingError::Io { path, source },
         other => TrainingError::File { path: path.to_owned(), problem: other.to_string() },

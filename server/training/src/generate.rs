@@ -8,7 +8,7 @@ use crate::canonical::fingerprint;
 use crate::database::{About, Database, JobKind};
 use crate::error::{PlanError, TrainingError};
 use crate::example::Outcome;
-use crate::folder::{Folder, Job, Progress, Stage};
+use crate::folder::{Folder, Job, Progress, Stage, from_database};
 use crate::interaction::Interaction;
 use crate::plan::plan;
 use crate::report::{Report, Run};
@@ -62,7 +62,7 @@ pub fn run(
     if database.examples.is_empty() {
         return Err(nothing().into());
     }
-    database.write(&path).map_err(|e| TrainingError::File { path: path.clone(), problem: e.to_string() })?;
+    database.write(&path).map_err(|e| from_database(e, &path))?;
     let run = Run {
         threads: n_threads,
         wall_s: begin.elapsed().as_secs_f64(),

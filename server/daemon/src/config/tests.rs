@@ -77,6 +77,28 @@ fn every_bad_file_gives_one_clear_message() {
         ("realtime_priority = 60", "realtime_priority = 100", &["runtime.realtime_priority", "0 to 99"]),
         ("{ tool = \"probe\", time_s = 0.3", "{ tool = \"prob\", time_s = 0.3", &["motion.1.tool", "`prob`", "probe"]),
         ("{ tool = \"probe\", time_s = 0.3", "{ tool = \"probe\", time_s = 0.7", &["time_s", "order"]),
+        ("divisions = [32, 16, 8]", "divisions = [999, 999, 999]", &["accurate.divisions", "1 to 1000000"]),
+        ("poisson_ratio = 0.48", "poisson_ratio = 0.5", &["accurate.poisson_ratio", "0 to 0.4999"]),
+        ("\"stable_neo_hookean\"", "\"rubber\"", &["accurate.model", "unknown variant `rubber`", "linear"]),
+        ("compliance_m = 2e-5", "compliance_m = 0", &["tie.compliance_m", "0.00000001 to 0.01"]),
+        ("rim_floor = 1e-4", "rim = 1e-4", &["tie.rim", "unknown field `rim`", "rim_floor"]),
+        ("tool = \"probe\"  ", "tool = \"drill\"  ", &["training.tool", "no tool `drill`", "name one of: probe"]),
+        (
+            "approach = \"vertical\"",
+            "approach = \"sideways\"",
+            &["approach", "\"vertical\", \"normal\", or a direction"],
+        ),
+        ("approach = \"vertical\"", "approach = [0, 0, 0]", &["training.approach", "no direction"]),
+        ("depth_share = [0.1, 0.35]", "depth_share = [0.35, 0.1]", &["training.depth_share", "smaller number first"]),
+        ("drag_share = 0.66", "drag_share = 1.66", &["training.drag_share", "0 to 1"]),
+        ("seed = 2 ", "seed = 1 ", &["evaluation.seed", "seed of training", "choose another"]),
+        ("name = \"lift\"", "name = \"a lift\"", &["evaluation.outside.1.name"]),
+        (
+            "action = \"lift\", examples = 15",
+            "action = \"lift\", drag_share = 1, examples = 15",
+            &["drag_share", "remove"],
+        ),
+        ("candidates_per_example = 2", "candidates_per_example = 1", &["candidates_per_example", "2 to 1000"]),
     ];
     for (from, to, fragments) in cases {
         let (message, line) = message_and_line(from, to);

@@ -154,7 +154,7 @@ mod tests {
             ("support_cells = 1.75", "support_cells = 1.8"),
             ("model = \"stable_neo_hookean\"", "model = \"linear\""),
             ("compliance_m = 2e-5", "compliance_m = 1e-5"),
-            ("band_m = 1e-3", "band_m = 2e-3"),
+            ("band_m = 2e-3", "band_m = 3e-3"),
             ("rim_floor = 1e-4", "rim_floor = 1e-3"),
             ("radius_m = 0.007", "radius_m = 0.006"),
             ("friction = 0.8 ", "friction = 0.7 "),
@@ -198,7 +198,7 @@ mod tests {
         assert_eq!(with("young_modulus_pa = 3e4 ", "young_modulus_pa = 30_000.0 "), own);
         // Keys that are left out are their defaults.
         assert_eq!(with("element = \"enhanced_strain\"", "# element ="), own);
-        assert_eq!(with("band_m = 1e-3", "# band_m ="), own);
+        assert_eq!(with("rim_floor = 1e-4", "# rim_floor ="), own);
     }
 
     #[test]
