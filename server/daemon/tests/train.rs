@@ -124,6 +124,44 @@ fn an_evaluation_has_two_references_and_other_interactions() {
     assert_eq!(shape("force_independent"), [2, 3]);
 }
 
+/// Comes down on the block, drags, and leaves: 1 s at 100 Hz.
+fn recorded_motion() -> String {
+    let mut text = "time_s,tool,px,py,pz,qx,qy,qz,qw\n".to_owned();
+    for k in 0..=100 {
+        let share = f64::from(k) / 100.0;
+        let height = 0.03 - 0.008 * (std::f64::consts::PI * share).sin();
+        text.push_str(&format!("{},rod,{},0.02,{height},0,0,0,1\n", 0.01 * f64::from(k), 0.018 + 0.004 * share));
+    }
+    text
+}
+
+#[test]
+fn states_of_a_recorded_motion_are_trained_on_and_the_motion_goes_along() {
+    let place = Place::new();
+    fs::create_dir(place.path("motions")).unwrap();
+    fs::write(place.path("motions/down.csv"), recorded_motion()).unwrap();
+    let recorded = "examples = 3\nrecorded = { file = \"motions/down.csv\" }";
+    fs::write(place.path("block.toml"), SCENE.replacen("examples = 4", recorded, 1)).unwrap();
+    let made = summary(&place.train(&["block.toml", "--folder", "job", "--json"]));
+    assert_eq!(made["result"]["examples"], 3, "{}", made["result"]["rejected"]);
+    assert_eq!(fs::read_to_string(place.path("job/motions/down.csv")).unwrap(), recorded_motion());
+    // The job's folder is complete without the place where it was made.
+    fs::remove_dir_all(place.path("motions")).unwrap();
+    fs::remove_file(place.path("job/report.json")).unwrap();
+    assert!(place.train(&["--job", "job"]).status.success());
+    assert!(place.path("job/report.json").exists());
+    // A file beside the scene's folder is named by its absolute path.
+    fs::write(place.path("up.csv"), recorded_motion()).unwrap();
+    fs::create_dir(place.path("scenes")).unwrap();
+    fs::write(
+        place.path("scenes/block.toml"),
+        SCENE.replacen("examples = 4", &recorded.replace("motions/down", "../up"), 1),
+    )
+    .unwrap();
+    summary(&place.train(&["scenes/block.toml", "--folder", "other", "--json"]));
+    assert!(fs::read_to_string(place.path("other/scene.toml")).unwrap().contains("file = \"/"));
+}
+
 /// Kills a job at ten random moments; then it is left alone.
 #[test]
 fn a_job_killed_ten_times_ends_with_the_same_database() {

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use nalgebra::Vector3;
 use plica_accurate::contact::{ContactError, ContactParams, ContactState, ContactSurface, Obstacle, Press};
-use plica_accurate::{Constraints, Energy, NodalForces, Params, Progress, Solid, SolveError, Solver, Tie, reactions};
+use plica_accurate::{Constraints, Energy, NodalForces, Params, Progress, Solid, SolveError, Solver, Tie};
 use plica_geometry::{Embedding, EmbeddingKind, HexIdx, HexMesh, NodeIdx, Skin, isoparametric};
 use serde::{Deserialize, Serialize};
 
@@ -189,13 +189,6 @@ impl Accurate {
             smallest_jacobian: info.smallest_jacobian.unwrap_or(1.0),
         };
         Ok(AccurateResult { offsets: self.offsets(&x), tool_force: info.force_n, solve })
-    }
-
-    /// Force that the supports exert \[N\] at positions `x`, tool and weight not counted.
-    pub fn support_force(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
-        let forces = reactions(&[&self.solid], x);
-        let held = (0..x.len()).filter(|&n| self.constraints.is_given(n) == [true; 3]);
-        held.map(|n| forces[n]).sum()
     }
 
     fn minimise(

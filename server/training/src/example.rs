@@ -4,7 +4,6 @@ use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::accurate::SolveInfo;
-use crate::canonical::fingerprint;
 use crate::coarse::Settling;
 use crate::interaction::Interaction;
 use crate::reference::ContactFrame;
@@ -57,7 +56,7 @@ pub struct Record {
     /// How the solve with its own contact went; evaluation only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub independent: Option<SolveInfo>,
-    /// Fingerprint of the interaction: a job that goes on checks that it is the planned one.
+    /// [`Setup::fingerprint`](crate::Setup::fingerprint): a job that goes on checks that it is the planned one.
     pub interaction_sha256: String,
 }
 
@@ -97,7 +96,7 @@ pub struct Rejection {
     pub depth_m: f64,
     /// Drag that was drawn \[m\].
     pub drag_m: [f64; 3],
-    /// Fingerprint of the interaction.
+    /// [`Setup::fingerprint`](crate::Setup::fingerprint).
     pub interaction_sha256: String,
 }
 
@@ -127,7 +126,12 @@ pub enum Reason {
 
 impl Rejection {
     /// An interaction that gives no example.
-    pub(crate) fn new(index: u32, interaction: &Interaction, reason: Reason, message: String) -> Self {
+    pub(crate) fn new(
+        (index, interaction_sha256): (u32, String),
+        interaction: &Interaction,
+        reason: Reason,
+        message: String,
+    ) -> Self {
         Self {
             index,
             kind: interaction.kind.clone(),
@@ -136,7 +140,7 @@ impl Rejection {
             contact_point_m: interaction.contact_point_m,
             depth_m: interaction.depth_m(),
             drag_m: interaction.drag().into(),
-            interaction_sha256: fingerprint(interaction),
+            interaction_sha256,
         }
     }
 }

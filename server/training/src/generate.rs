@@ -4,7 +4,6 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::Instant;
 
-use crate::canonical::fingerprint;
 use crate::database::{About, Database, JobKind};
 use crate::error::{PlanError, TrainingError};
 use crate::example::Outcome;
@@ -43,7 +42,7 @@ pub fn run(
     tell(folder, watch, &start)?;
     let interactions = plan(setup, &sets, seed)?;
     let tally = Tally::new(folder, watch, interactions.len() as u32, n_threads);
-    let fingerprints: Vec<String> = interactions.iter().map(fingerprint).collect();
+    let fingerprints: Vec<String> = interactions.iter().map(|i| setup.fingerprint(i)).collect();
     let mut open = Vec::new();
     for (index, expected) in fingerprints.iter().enumerate() {
         match folder.finished(&about, index as u32, expected)? {
@@ -53,6 +52,7 @@ pub fn run(
     }
     tally.report()?;
     let n_resumed = interactions.len() - open.len();
+    let n_threads = n_threads.clamp(1, open.len().max(1));
     let work = Work { setup, interactions: &interactions, open: &open, about: &about, kind: job.kind };
     let sizes = work.run(n_threads, folder, watch, &tally)?;
     tell(folder, watch, &Progress { stage: Stage::Database, seconds_left: Some(0.0), ..tally.now() })?;
@@ -106,7 +106,7 @@ impl Work<'_> {
         tally: &Tally<'_>,
     ) -> Result<(usize, usize), TrainingError> {
         let threads = |e: rayon::ThreadPoolBuildError| TrainingError::Threads { n_threads, reason: e.to_string() };
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads.max(1)).build().map_err(threads)?;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().map_err(threads)?;
         let (next, failed) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let cancelled = || watch.cancelled() || failed.load(Relaxed) > 0;
         let worker = |_: rayon::BroadcastContext<'_>| {

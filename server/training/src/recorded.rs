@@ -15,7 +15,7 @@ const LEAST_PRESS_M: f64 = 0.5e-3;
 const LEAST_STEP_M: f64 = 0.2e-3;
 const LEVER_M: f64 = 0.05;
 
-/// Candidates: poses that press the object at rest, `count * candidates_per_example` of them at most, drawn without
+/// Candidates: poses that press the object at rest and come after one that is clear of it, `count * candidates_per_example` of them at most, drawn without
 /// replacement; each follows the motion from the last pose that was clear of the object.
 pub(crate) fn candidates(
     setup: &Setup,
@@ -28,7 +28,8 @@ pub(crate) fn candidates(
     let nothing = || PlanError::NothingTouched { set: set.name.clone(), n_poses: own.len() };
     let shape = obstacle(&setup.coarse.tools[set.tool].shape).map_err(|_| nothing())?;
     let gaps: Vec<f64> = own.iter().map(|pose| clearance(&shape, pose, skin.skin().positions())).collect();
-    let pressing: Vec<usize> = (0..own.len()).filter(|&i| gaps[i] < -LEAST_PRESS_M).collect();
+    let first_clear = gaps.iter().position(|gap| *gap > 0.0).unwrap_or(own.len());
+    let pressing: Vec<usize> = (first_clear..own.len()).filter(|&i| gaps[i] < -LEAST_PRESS_M).collect();
     if pressing.is_empty() {
         return Err(nothing());
     }

@@ -4,6 +4,10 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use plica_accurate::{Material, TieOptions};
 use plica_geometry::HexMesh;
 use plica_sim::ModelDescription;
+use serde::Serialize;
+
+use crate::canonical::fingerprint;
+use crate::interaction::Interaction;
 
 /// A scene and what to train on it. SI units.
 #[derive(Debug, Clone)]
@@ -33,6 +37,15 @@ pub struct Setup {
     pub evaluation_seed: u64,
 }
 
+impl Setup {
+    /// Names what is done at an interaction: the scene's hash leaves out how it is driven to and how frames are laid. 64
+    /// hexadecimal digits.
+    pub fn fingerprint(&self, interaction: &Interaction) -> String {
+        let axes = self.stamp_axes.map(<[f64; 3]>::from);
+        fingerprint(&(interaction, self.drive, axes))
+    }
+}
+
 /// The accurate model.
 #[derive(Debug, Clone)]
 pub struct AccurateDescription {
@@ -47,7 +60,7 @@ pub struct AccurateDescription {
 }
 
 /// How the coarse model is driven to a pose, and when it counts as settled.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DriveOptions {
     /// Speed of the tool \[m/s\].
     pub speed_m_per_s: f64,

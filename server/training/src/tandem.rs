@@ -6,7 +6,6 @@ use plica_accurate::{Tie, TieTarget};
 
 use crate::accurate::{Accurate, AccurateFailure, AccurateResult, SolveInfo};
 use crate::band::{around_tool, under_disc};
-use crate::canonical::fingerprint;
 use crate::coarse::{Cancelled, Coarse, CoarseResult, Interrupted};
 use crate::error::BuildError;
 use crate::example::{Example, Outcome, Reason, Record, Rejection, difference, numbers, rows, to_f32};
@@ -114,10 +113,15 @@ impl<'a> Tandem<'a> {
     ) -> Result<Outcome, Interrupted> {
         match self.try_solve(index, interaction, with_independent, cancelled) {
             Ok(example) if example.is_finite() => Ok(Outcome::Accepted(Box::new(example))),
-            Ok(_) => Ok(rejected(index, interaction, Reason::NotFinite, "a number of the result is not finite".into())),
-            Err(Stop::Rejected(reason, message)) => Ok(rejected(index, interaction, reason, message)),
+            Ok(_) => Ok(self.rejected(index, interaction, Reason::NotFinite, "a number of it is not finite".into())),
+            Err(Stop::Rejected(reason, message)) => Ok(self.rejected(index, interaction, reason, message)),
             Err(Stop::Interrupted) => Err(Interrupted),
         }
+    }
+
+    fn rejected(&self, index: u32, interaction: &Interaction, reason: Reason, message: String) -> Outcome {
+        let fingerprint = self.setup.fingerprint(interaction);
+        Outcome::Rejected(Rejection::new((index, fingerprint), interaction, reason, message))
     }
 
     fn try_solve(
@@ -152,7 +156,7 @@ impl<'a> Tandem<'a> {
                 n_tied: half.targets.len() as u32,
                 tied: tied.solve,
                 independent: independent.map(|r| r.solve),
-                interaction_sha256: fingerprint(interaction),
+                interaction_sha256: self.setup.fingerprint(interaction),
             },
         })
     }
@@ -264,8 +268,4 @@ fn accept(
         Err(AccurateFailure::Failed(message)) => Err(Stop::Rejected(not_converged, message)),
         Err(AccurateFailure::Interrupted) => Err(Stop::Interrupted),
     }
-}
-
-fn rejected(index: u32, interaction: &Interaction, reason: Reason, message: String) -> Outcome {
-    Outcome::Rejected(Rejection::new(index, interaction, reason, message))
 }

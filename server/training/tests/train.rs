@@ -230,3 +230,15 @@ fn a_folder_that_cannot_be_written_is_named() {
     let error = run(&setup, &job(JobKind::Training, None), 1, &job_folder, &Counting::patient()).unwrap_err();
     assert!(matches!(error, TrainingError::Io { .. }), "{error}");
 }
+
+/// How a pose is driven to is no part of the scene's hash, but an example depends on it.
+#[test]
+fn examples_that_were_driven_otherwise_are_not_taken_over() {
+    let setup = common::tiny();
+    let folder = TempDir::new().unwrap();
+    train(&setup, &folder, JobKind::Training, 2, &Counting::patient()).unwrap();
+    let mut other = setup.clone();
+    other.drive.speed_m_per_s *= 2.0;
+    let message = train(&other, &folder, JobKind::Training, 1, &Counting::patient()).unwrap_err().to_string();
+    assert!(message.contains("another plan"), "{message}");
+}
