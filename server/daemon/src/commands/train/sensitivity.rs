@@ -32,7 +32,7 @@ pub(super) fn run(config: &Config, n_interactions: usize, n_threads: usize, json
         meshes.push((name, scene::describe_accurate(config, Some(divisions))?));
     }
     let variations =
-        Variations { n_interactions, meshes, tie_factors: TIE_FACTORS.to_vec(), independent_on_all_meshes: false };
+        Variations { n_interactions, meshes, tie_factors: TIE_FACTORS.to_vec(), independent_on_all_meshes: true };
     let said = |what: &str| tracing::info!("solves {n_interactions} interactions: {what}");
     let found = sensitivity(&setup, &variations, n_threads, &watch, &said)?;
     print(&found);
