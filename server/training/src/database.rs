@@ -99,12 +99,12 @@ pub fn versions() -> BTreeMap<String, u32> {
 #[derive(Debug, thiserror::Error)]
 pub enum DatabaseError {
     /// It cannot be read.
-    #[error("{path}: {source}", path = path.display())]
+    #[error("{path}: {error}", path = path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        error: std::io::Error,
     },
     /// It is cut off, or no safetensors file.
     #[error("{path}: truncated, or not a safetensors file: {problem}", path = path.display())]

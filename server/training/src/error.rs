@@ -42,16 +42,16 @@ pub enum BuildError {
     #[error("coarse model: {0}")]
     Coarse(#[from] ModelError),
     /// The accurate model.
-    #[error("accurate model: {0}")]
+    #[error("accurate model")]
     Accurate(#[from] SolidError),
     /// The accurate model's matrix.
-    #[error("accurate model: {0}")]
+    #[error("accurate model")]
     Solver(#[from] SolveError),
     /// The skin does not lie in the accurate mesh.
-    #[error("accurate model: {0}")]
+    #[error("accurate model")]
     Embedding(#[from] EmbeddingError),
     /// A tool without volume.
-    #[error("tool `{tool}`: {source}")]
+    #[error("tool `{tool}`")]
     Tool {
         /// The tool.
         tool: String,
@@ -76,12 +76,12 @@ pub enum TrainingError {
     #[error(transparent)]
     Build(#[from] BuildError),
     /// A file of the job cannot be written or read. Finished examples are kept.
-    #[error("{path}: {source}{advice}", path = path.display(), advice = advice(source))]
+    #[error("{path}: {error}{advice}", path = path.display(), advice = advice(error))]
     Io {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        error: std::io::Error,
     },
     /// A file of the job is not what it should be.
     #[error("{path}: {problem}", path = path.display())]

@@ -88,7 +88,7 @@ impl Folder {
         let examples = root.join("examples");
         let at = |path: &Path| {
             let path = path.to_owned();
-            move |source| TrainingError::Io { path, source }
+            move |error| TrainingError::Io { path, error }
         };
         fs::create_dir_all(&examples).map_err(at(&examples))?;
         let lock_path = root.join(".lock");
@@ -98,7 +98,7 @@ impl Folder {
                 path: root.to_owned(),
                 problem: "another process works in this folder; wait for it or stop it".into(),
             },
-            TryLockError::Error(source) => TrainingError::Io { path: lock_path.clone(), source },
+            TryLockError::Error(error) => TrainingError::Io { path: lock_path.clone(), error },
         })?;
         remove_leftovers(root).map_err(at(root))?;
         remove_leftovers(&examples).map_err(at(&examples))?;
@@ -236,7 +236,7 @@ impl Folder {
     }
 
     fn write_json(&self, path: &Path, value: &impl Serialize) -> Result<(), TrainingError> {
-        let at = |source| TrainingError::Io { path: path.to_owned(), source };
+        let at = |error| TrainingError::Io { path: path.to_owned(), error };
         let mut text = serde_json::to_vec_pretty(value).map_err(|e| at(io::Error::other(e)))?;
         text.push(b'\n');
         write_atomically(path, &text).map_err(at)
@@ -253,7 +253,7 @@ struct StoredRejection {
 
 pub(crate) fn from_database(error: DatabaseError, path: &Path) -> TrainingError {
     match error {
-        DatabaseError::Io { path, source } => TrainingError::Io { path, source },
+        DatabaseError::Io { path, error } => TrainingError::Io { path, error },
         other => TrainingError::File { path: path.to_owned(), problem: other.to_string() },
     }
 }
@@ -262,7 +262,7 @@ pub(crate) fn from_database(error: DatabaseError, path: &Path) -> TrainingError 
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, TrainingError> {
     let text = match fs::read(path) {
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Err(source) => return Err(TrainingError::Io { path: path.to_owned(), source }),
+        Err(error) => return Err(TrainingError::Io { path: path.to_owned(), error }),
         Ok(text) => text,
     };
     let value = serde_json::from_slice(&text);

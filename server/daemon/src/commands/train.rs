@@ -8,12 +8,11 @@ mod watch;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use plica_training::{Folder, Job, JobKind, Report, TrainingError, write_atomically};
+use plica_training::{Folder, Job, JobKind, Report, write_atomically};
 
 use crate::cli::{TrainArgs, TrainKind};
 use crate::config::Config;
 use crate::training::{JobRequest, make, setup};
-use standing::{State, write as write_standing};
 use watch::{Ending, OnTerminal, ToLog};
 
 /// Exit code of a job that was asked to stop, and did: what is finished is kept.
@@ -51,14 +50,13 @@ fn run_scene(config: &Config, args: &TrainArgs, n_threads: u32, json: bool) -> a
     let root = args.folder.clone().unwrap_or_else(|| default_folder(config, kind));
     let request = JobRequest { kind, examples: args.examples, seed: args.seed, threads: n_threads };
     let (folder, job) = make(&root, config, &request)?;
-    let begun = write_standing(&root, State::Running, None, None)?;
+    let begun = standing::begin(&root)?;
     let watch = OnTerminal::new(ending);
     let result = work(config, &job, &folder, n_threads as usize, &watch);
     watch.finish();
-    let (state, reason) = State::of(&result);
     // The result counts, even if the note about it cannot be written.
-    if let Err(error) = write_standing(&root, state, reason, Some(begun)) {
-        tracing::warn!("{error}");
+    if let Err(error) = standing::end(&root, begun, &result) {
+        tracing::warn!("{error:#}");
     }
     let report = result?;
     if let Some(out) = &args.out {
@@ -118,17 +116,4 @@ fn summary(report: &Report, database: &Path, folder: &Path) -> Result<String, se
     value["database"] = database.display().to_string().into();
     value["folder"] = folder.display().to_string().into();
     serde_json::to_string(&value)
-}
-
-impl State {
-    /// Where a job stands after `result`, and why.
-    fn of(result: &anyhow::Result<Report>) -> (Self, Option<String>) {
-        match result {
-            Ok(_) => (Self::Done, None),
-            Err(error) => match error.downcast_ref() {
-                Some(TrainingError::Interrupted) => (Self::Paused, Some("interrupted".to_owned())),
-                _ => (Self::Failed, Some(format!("{error:#}"))),
-            },
-        }
-    }
 }

@@ -16,7 +16,7 @@ impl Database {
     /// See [`DatabaseError`].
     pub fn read(path: &Path, scene_hash: Option<&str>) -> Result<Self, DatabaseError> {
         let file = BeingRead { path };
-        let bytes = std::fs::read(path).map_err(|source| DatabaseError::Io { path: path.to_owned(), source })?;
+        let bytes = std::fs::read(path).map_err(|error| DatabaseError::Io { path: path.to_owned(), error })?;
         let tensors = SafeTensors::deserialize(&bytes).map_err(|e| file.malformed(e.to_string()))?;
         let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|e| file.malformed(e.to_string()))?;
         let text = header.metadata().as_ref().and_then(|m| m.get(METADATA_KEY));

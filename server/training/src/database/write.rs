@@ -19,7 +19,7 @@ impl Database {
     pub fn write(&self, path: &Path) -> Result<(), DatabaseError> {
         let inconsistent = |problem| DatabaseError::Inconsistent { path: path.to_owned(), problem };
         let bytes = self.to_bytes().map_err(inconsistent)?;
-        write_atomically(path, &bytes).map_err(|source| DatabaseError::Io { path: path.to_owned(), source })
+        write_atomically(path, &bytes).map_err(|error| DatabaseError::Io { path: path.to_owned(), error })
     }
 
     /// The bytes of the file; the error says which example does not fit the first one.

@@ -4,42 +4,40 @@ use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
-use plica_training::write_atomically;
-use serde_json::json;
+use plica_protocol::jobs::JobState;
+use plica_training::{Report, TrainingError};
 
-/// Where a job stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum State {
-    Running,
-    Paused,
-    Done,
-    Failed,
+use crate::jobs::{JobFolder, Standing};
+
+/// Notes that this process works on the job.
+pub(super) fn begin(root: &Path) -> anyhow::Result<Standing> {
+    let standing = Standing {
+        state: JobState::Running,
+        reason: None,
+        started_unix_s: Some(now()),
+        finished_unix_s: None,
+        pid: Some(std::process::id()),
+    };
+    write(root, &standing)?;
+    Ok(standing)
 }
 
-impl State {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Running => "running",
-            Self::Paused => "paused",
-            Self::Done => "done",
-            Self::Failed => "failed",
-        }
-    }
+/// Notes how it ended, and why.
+pub(super) fn end(root: &Path, begun: Standing, result: &anyhow::Result<Report>) -> anyhow::Result<()> {
+    let (state, reason) = match result {
+        Ok(_) => (JobState::Done, None),
+        Err(error) => match error.downcast_ref() {
+            Some(TrainingError::Interrupted) => (JobState::Paused, Some("interrupted".to_owned())),
+            _ => (JobState::Failed, Some(format!("{error:#}"))),
+        },
+    };
+    write(root, &Standing { state, reason, finished_unix_s: Some(now()), pid: None, ..begun })
 }
 
-/// Writes where the job stands; returns when it was begun \[s since 1970\].
-pub(super) fn write(folder: &Path, state: State, reason: Option<String>, begun: Option<u64>) -> anyhow::Result<u64> {
-    let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
-    let is_over = state != State::Running;
-    let value = json!({
-        "state": state.name(),
-        "reason": reason,
-        "started_unix_s": begun.unwrap_or(now),
-        "finished_unix_s": is_over.then_some(now),
-        "pid": (!is_over).then(std::process::id),
-    });
-    let path = folder.join("state.json");
-    let text = format!("{}\n", serde_json::to_string_pretty(&value)?);
-    write_atomically(&path, text.as_bytes()).with_context(|| path.display().to_string())?;
-    Ok(begun.unwrap_or(now))
+fn write(root: &Path, standing: &Standing) -> anyhow::Result<()> {
+    JobFolder::new(root.to_owned()).write_standing(standing).with_context(|| root.display().to_string())
+}
+
+fn now() -> u64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs())
 }
