@@ -6,6 +6,7 @@
 mod box_tree;
 mod clusters;
 mod embedding;
+mod exponential_map;
 pub mod export;
 mod hex_mesh;
 pub mod import;
@@ -20,6 +21,7 @@ mod skin;
 
 pub use clusters::CLUSTER_SIZE;
 pub use embedding::{DEFAULT_SUPPORT_CELLS, Embedding, EmbeddingError, EmbeddingKind, MAX_OUTSIDE_CELLS};
+pub use exponential_map::{ExponentialMaps, Mapped};
 pub use hex_mesh::{HEX_FACES, HexMesh, MeshError};
 pub use index::{HexIdx, NodeIdx, TriangleIdx, VertexIdx};
 pub use locate::{Location, Locator, locate};

@@ -133,7 +133,8 @@ impl Outbox {
         self.skin_waker.wake();
     }
 
-    fn hand_out_reading(&mut self, state: &State, report: &TickReport, paused: bool) {
+    /// What the status says.
+    pub(super) fn hand_out_reading(&mut self, state: &State, report: &TickReport, paused: bool) {
         let reading = self.readings.input_buffer_mut();
         reading.tick = state.tick();
         reading.sim_time_s = state.sim_time_s();

@@ -260,7 +260,9 @@ impl Loop {
         }
     }
 
+    /// The status is true before the answer is heard.
     fn reply(&mut self, result: Result<Option<u64>, Refusal>, returned: Vec<ToolPose>) {
+        self.outbox.hand_out_reading(&self.state, &self.report, self.paused);
         let outcome = result.map(|snapshot| Outcome {
             tick: self.state.tick(),
             sim_time_s: self.state.sim_time_s(),
