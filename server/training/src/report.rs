@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Vector3;
 use serde::Serialize;
 
 use crate::accurate::SolveInfo;
 use crate::database::{Database, JobKind};
-use crate::example::{Record, Rejection};
+use crate::example::{Example, Record, Rejection};
 use crate::reference::ReferenceSkin;
 use crate::setup::Setup;
 
@@ -56,6 +57,8 @@ pub struct Summary {
     pub detail_max_m: Option<Spread>,
     /// The same against the accurate model's own contact \[m\].
     pub independent_rms_m: Option<Spread>,
+    /// Size of the tie's force over that of the accurate model's own contact, by set; for lifts the suction stands for the contact.
+    pub tied_over_independent_force: BTreeMap<String, Spread>,
     /// Interactions without an example, with the reason.
     pub rejected: Vec<Rejection>,
 }
@@ -134,11 +137,23 @@ impl Report {
             detail_rms_m: Spread::of(details().map(|d| rms(d, &areas))),
             detail_max_m: Spread::of(details().map(|d| largest(d))),
             independent_rms_m: Spread::of(own().map(|d| rms(d, &areas))),
+            tied_over_independent_force: force_ratios(examples),
             rejected: database.rejected.clone(),
         };
         let about = &database.about;
         Self { scene_hash: about.scene_hash.clone(), kind: about.kind, seed: about.seed, result, run }
     }
+}
+
+fn force_ratios(examples: &[Example]) -> BTreeMap<String, Spread> {
+    let size = |f: &[f64; 3]| Vector3::from(*f).norm();
+    let mut ratios: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    for example in examples {
+        if let Some(own) = example.independent_force.as_ref().map(size).filter(|n| *n > 0.0) {
+            ratios.entry(example.record.kind.clone()).or_default().push(size(&example.tied_force) / own);
+        }
+    }
+    ratios.into_iter().filter_map(|(kind, all)| Some((kind, Spread::of(all.into_iter())?))).collect()
 }
 
 impl Solves {
