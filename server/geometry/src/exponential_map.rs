@@ -96,9 +96,8 @@ impl<'a, A: Fn(VertexIdx) -> bool> Front<'a, A> {
         (this.distance[source], this.is_final[source]) = (0.0, true);
         let fan = maps.fan(source);
         let centre = maps.position(source);
-        let turn = |&[a, b]: &[u32; 2]| {
-            (maps.position(a as usize) - centre).angle(&(maps.position(b as usize) - centre))
-        };
+        let turn =
+            |&[a, b]: &[u32; 2]| (maps.position(a as usize) - centre).angle(&(maps.position(b as usize) - centre));
         let scale = TAU / fan.iter().map(turn).sum::<f64>();
         let (mut next, mut theta) = (fan.first(), 0.0);
         for _ in 0..fan.len() {
@@ -206,7 +205,13 @@ mod tests {
         // Along the top as it rises, and down the sides at y = 0 and y = 60 mm.
         let net = |p: &Point3<f64>| {
             let below = shape.height_m(p.x) - p.z;
-            let across = if p.y < 1e-9 { -below } else if p.y > 0.06 - 1e-9 { 0.06 + below } else { p.y };
+            let across = if p.y < 1e-9 {
+                -below
+            } else if p.y > 0.06 - 1e-9 {
+                0.06 + below
+            } else {
+                p.y
+            };
             let is_on_net = below < 1e-9 || p.y < 1e-9 || p.y > 0.06 - 1e-9;
             is_on_net.then(|| Vector2::new(p.x / slope.cos(), across))
         };
