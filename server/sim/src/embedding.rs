@@ -123,6 +123,19 @@ impl SkinEmbedding {
             copy_axes(&offsets, chunk);
         }
     }
+
+    /// The same with a fourth component of zero.
+    pub(crate) fn copy_padded_offsets(&self, skin: &SkinPositions, out: &mut [Node]) {
+        let clusters = skin.positions.iter().zip(&self.clusters);
+        for (chunk, (deformed, cluster)) in out[..self.n_skin].chunks_mut(CLUSTER_SIZE).zip(clusters) {
+            for (g, vertices) in chunk.chunks_mut(LANES).enumerate() {
+                let [x, y, z] = std::array::from_fn(|k| (deformed[k][g] - cluster.rest[k][g]).to_array());
+                for (lane, vertex) in vertices.iter_mut().enumerate() {
+                    *vertex = [x[lane], y[lane], z[lane], 0.0];
+                }
+            }
+        }
+    }
 }
 
 impl SkinPositions {

@@ -10,6 +10,7 @@ mod contact;
 mod description;
 mod element;
 mod embedding;
+pub mod enrichment;
 mod lanes;
 mod model;
 mod probe;

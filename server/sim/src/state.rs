@@ -122,6 +122,11 @@ impl State {
         model.embedding.copy_offsets(&self.skin, out);
     }
 
+    /// The same with a fourth component of zero, `[n_skin]` \[m\].
+    pub fn write_padded_offsets(&self, model: &Model, out: &mut [[f32; 4]]) {
+        model.embedding.copy_padded_offsets(&self.skin, out);
+    }
+
     /// Displacements in the order of the mesh's nodes, `[n_nodes]` \[m\].
     pub fn node_displacements(&self, model: &Model) -> Vec<Vector3<f64>> {
         in_mesh_order(model, &self.u)

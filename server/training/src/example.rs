@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::accurate::SolveInfo;
 use crate::coarse::Settling;
 use crate::interaction::Interaction;
-use crate::reference::ContactFrame;
+use plica_geometry::ContactFrame;
 
 /// One interaction solved by both models. What is large is `f32`, as the run-time phase uses it.
 #[derive(Debug, Clone, PartialEq)]

@@ -22,7 +22,6 @@ mod obstacle;
 mod plan;
 mod random;
 mod recorded;
-mod reference;
 mod report;
 mod sensitivity;
 mod setup;
@@ -44,7 +43,6 @@ pub use generate::{Watch, run};
 pub use interaction::{Action, Interaction};
 pub use plan::plan;
 pub use random::GENERATOR;
-pub use reference::{ContactFrame, ReferenceSkin, SurfacePoint, frame_around};
 pub use report::{Report, Run, Solves, Spread, Summary};
 pub use sensitivity::{Difference, Force, Sensitivity, Variations, sensitivity};
 pub use setup::{

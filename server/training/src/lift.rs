@@ -8,8 +8,8 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::coarse::{Cancelled, Coarse, CoarseResult, Interrupted};
-use crate::reference::{ReferenceSkin, SurfacePoint};
 use crate::setup::DriveOptions;
+use plica_geometry::{ReferenceSkin, SurfacePoint};
 
 /// Largest error of the height, as a share of it.
 const HEIGHT_TOLERANCE: f64 = 2e-3;

@@ -8,8 +8,8 @@ use crate::interaction::{Action, Interaction, orientation};
 use crate::obstacle::radius_m;
 use crate::random::Draws;
 use crate::recorded;
-use crate::reference::{ReferenceSkin, SurfacePoint};
 use crate::setup::{Approach, FeatureScales, InteractionSet, PressRanges, Setup, Source};
+use plica_geometry::{ReferenceSkin, SurfacePoint};
 
 /// Points that are tried before a region counts as one that the skin does not meet.
 const MAX_TRIES: usize = 10_000;
@@ -130,7 +130,7 @@ impl<'a> Region<'a> {
             let within = |[l, h]: &[nalgebra::Point3<f64>; 2]| (0..3).all(|k| (l[k]..=h[k]).contains(&p.position[k]));
             boxes.is_empty() || boxes.iter().any(within)
         };
-        let mut points = (0..MAX_TRIES).filter_map(|_| self.skin.draw(&self.eligible, draws));
+        let mut points = (0..MAX_TRIES).filter_map(|_| self.skin.draw(&self.eligible, || draws.unit()));
         points.find(is_inside).ok_or_else(|| PlanError::NoSkin { set: self.set.name.clone() })
     }
 
@@ -145,7 +145,7 @@ impl<'a> Region<'a> {
 }
 
 fn tangents(normal: &Vector3<f64>, axes: &[Vector3<f64>; 2]) -> [Vector3<f64>; 2] {
-    let frame = crate::reference::frame_around(normal, axes);
+    let frame = plica_geometry::frame_around(normal, axes);
     [frame.tau, frame.theta]
 }
 

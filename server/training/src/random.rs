@@ -14,13 +14,13 @@ pub const GENERATOR: &str =
 
 /// A stream of random numbers.
 #[derive(Debug, Clone)]
-pub struct Draws {
+pub(crate) struct Draws {
     generator: ChaCha8Rng,
 }
 
 impl Draws {
     /// The stream of one candidate of one set of interactions.
-    pub fn new(seed: u64, set: u32, candidate: u32) -> Self {
+    pub(crate) fn new(seed: u64, set: u32, candidate: u32) -> Self {
         let mut key = [0; 32];
         key[..8].copy_from_slice(&seed.to_le_bytes());
         let mut generator = ChaCha8Rng::from_seed(key);
@@ -29,17 +29,17 @@ impl Draws {
     }
 
     /// Uniform in `[0, 1)`, a multiple of 2^-53.
-    pub fn unit(&mut self) -> f64 {
+    pub(crate) fn unit(&mut self) -> f64 {
         (self.generator.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
     /// Uniform in `[least, most)`.
-    pub fn between(&mut self, [least, most]: [f64; 2]) -> f64 {
+    pub(crate) fn between(&mut self, [least, most]: [f64; 2]) -> f64 {
         least + (most - least) * self.unit()
     }
 
     /// A uniform direction in the plane: a point of the unit disc, pushed to its rim.
-    pub fn direction(&mut self) -> [f64; 2] {
+    pub(crate) fn direction(&mut self) -> [f64; 2] {
         loop {
             let (x, y) = (self.between([-1.0, 1.0]), self.between([-1.0, 1.0]));
             let squared = x * x + y * y;

@@ -6,8 +6,8 @@ use crate::error::PlanError;
 use crate::interaction::{Action, Interaction, from_numbers, to_numbers};
 use crate::obstacle::{clearance, obstacle};
 use crate::random::Draws;
-use crate::reference::ReferenceSkin;
 use crate::setup::{InteractionSet, RecordedPose, Setup};
+use plica_geometry::ReferenceSkin;
 
 /// A pose that overlaps the object at rest by less than this is no press \[m\].
 const LEAST_PRESS_M: f64 = 0.5e-3;

@@ -8,8 +8,8 @@ use serde::Serialize;
 use crate::accurate::SolveInfo;
 use crate::database::{Database, JobKind};
 use crate::example::{Example, Record, Rejection};
-use crate::reference::ReferenceSkin;
 use crate::setup::Setup;
+use plica_geometry::ReferenceSkin;
 
 /// What a job did.
 #[derive(Debug, Clone, Serialize)]

@@ -13,10 +13,10 @@ use crate::error::TrainingError;
 use crate::generate::Watch;
 use crate::interaction::Interaction;
 use crate::plan::plan;
-use crate::reference::ReferenceSkin;
 use crate::report::Spread;
 use crate::setup::{AccurateDescription, InteractionSet, Setup};
 use crate::tandem::{CoarseHalf, Stop, Tandem};
+use plica_geometry::ReferenceSkin;
 
 /// Vertices with this share of the tie's stiffness or more count as the imprint.
 const HELD: f64 = 0.01;

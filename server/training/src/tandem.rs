@@ -12,9 +12,9 @@ use crate::example::{Example, Outcome, Reason, Record, Rejection, difference, nu
 use crate::interaction::{Action, Interaction, to_numbers};
 use crate::lift::{Disc, lift};
 use crate::obstacle::obstacle;
-use crate::reference::{ReferenceSkin, SurfacePoint};
 use crate::setup::Setup;
 use crate::way::Way;
+use plica_geometry::{ReferenceSkin, SurfacePoint};
 
 /// A result with an element below this `det F` is not stored.
 pub const SMALLEST_JACOBIAN: f64 = 0.05;

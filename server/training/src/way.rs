@@ -6,7 +6,7 @@ use plica_accurate::contact::Obstacle;
 use crate::interaction::{Action, Interaction, from_numbers};
 use crate::obstacle::first_touch;
 use crate::plan::line_of_approach;
-use crate::reference::ReferenceSkin;
+use plica_geometry::ReferenceSkin;
 
 /// A turn counts as the path of a point this far from the tool's origin \[m\].
 const LEVER_M: f64 = 0.05;

@@ -1,9 +1,9 @@
-//! The reference skin as interactions see it: where to touch, how thick it is there, and the frame around a point.
+//! The skin at rest as whoever touches it sees it: where to touch, how thick it is there, and the frame around a point.
 
 use nalgebra::{Point3, Vector3};
-use plica_geometry::{Skin, TriangleIdx};
 
-use crate::random::Draws;
+use crate::index::{TriangleIdx, VertexIdx};
+use crate::skin::Skin;
 
 /// A tangential part shorter than this share of the stamp axis gives no direction.
 const DEGENERATE: f64 = 0.1;
@@ -95,13 +95,13 @@ impl ReferenceSkin {
         eligible
     }
 
-    /// A point of the eligible triangles, uniform by area. `None` without any.
-    pub fn draw(&self, eligible: &[(TriangleIdx, f64)], draws: &mut Draws) -> Option<SurfacePoint> {
+    /// A point of the eligible triangles, uniform by area, from numbers that are uniform in `0..1`. `None` without triangles.
+    pub fn draw(&self, eligible: &[(TriangleIdx, f64)], mut uniform: impl FnMut() -> f64) -> Option<SurfacePoint> {
         let total = eligible.last()?.1;
-        let at = draws.unit() * total;
+        let at = uniform() * total;
         let triangle = eligible[eligible.partition_point(|(_, sum)| *sum <= at).min(eligible.len() - 1)].0;
         // The unit square, folded over its diagonal: uniform, and without a root.
-        let (mut v, mut w) = (draws.unit(), draws.unit());
+        let (mut v, mut w) = (uniform(), uniform());
         if v + w > 1.0 {
             (v, w) = (1.0 - v, 1.0 - w);
         }
@@ -120,6 +120,19 @@ impl ReferenceSkin {
             if (b.position - p).norm_squared() < (a.position - p).norm_squared() { b } else { a }
         };
         points.reduce(nearer).expect("a skin has triangles")
+    }
+
+    /// The nearest point of the triangles around a vertex.
+    pub fn nearest_around(&self, p: &Point3<f64>, around: &[TriangleIdx]) -> Option<SurfacePoint> {
+        let points = around.iter().map(|&t| self.point(t, closest_weights(p, &self.skin.corner_positions(t))));
+        points.min_by(|a, b| (a.position - p).norm_squared().total_cmp(&(b.position - p).norm_squared()))
+    }
+
+    /// A vertex as a point of the skin.
+    pub fn vertex(&self, v: VertexIdx) -> Option<SurfacePoint> {
+        let triangle = self.skin.triangles().iter().position(|corners| corners.contains(&v))?;
+        let weights = self.skin.triangles()[triangle].map(|c| f64::from(u8::from(c == v)));
+        Some(self.point(TriangleIdx::from_index(triangle), weights))
     }
 
     /// Normal at a point: those of the corners, blended, so that it turns smoothly over an edge.
@@ -216,9 +229,8 @@ fn closest_weights(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> [f64; 3] {
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-    use plica_geometry::shapes::{Wedge, wedge_skin};
-
     use super::*;
+    use crate::shapes::{Wedge, wedge_skin};
 
     fn wedge() -> ReferenceSkin {
         ReferenceSkin::new(&wedge_skin(&Wedge::default(), 4e-3))
@@ -229,10 +241,15 @@ mod tests {
         let skin = wedge();
         let region = [[Point3::new(0.02, 0.012, -1.0), Point3::new(0.08, 0.048, 1.0)]];
         let eligible = skin.eligible(&region, |n| n.z > 0.2);
-        let mut draws = Draws::new(7, 0, 0);
+        // A Weyl sequence: its steps are equidistributed.
+        let mut n = 0.0;
+        let mut uniform = || {
+            n += 1.0;
+            (n * 0.569_840_290_998_053_2_f64 + n * n * 0.754_877_666_246_692_7) % 1.0
+        };
         let (mut left, mut all) = (0, 0);
         while all < 4000 {
-            let p = skin.draw(&eligible, &mut draws).unwrap().position;
+            let p = skin.draw(&eligible, &mut uniform).unwrap().position;
             if (0.02..0.08).contains(&p.x) && (0.012..0.048).contains(&p.y) {
                 assert!((p.z - Wedge::default().height_m(p.x)).abs() < 1e-12, "{p}");
                 all += 1;

@@ -1,0 +1,321 @@
+//! Surface coordinates around a contact point that moves.
+//!
+//! Discrete exponential maps around some skin vertices, the anchors, are tabulated. Around a contact point `c`, the maps of its
+//! three nearest anchors are turned into the frame at `c`, shifted so that `c` is their origin, and blended:
+//!
+//! `q(p) = sum_k w_k R_k (q_k(p) - q_k(c))`
+//!
+//! On a surface that can be unfolded every term is the same; elsewhere the blend moves smoothly with `c`. Or, as in the paper,
+//! vertices are projected onto the tangent plane \[SSH12, 5.3\].
+
+use nalgebra::{Rotation2, Vector2, Vector3};
+use plica_geometry::{ContactFrame, ExponentialMaps, ReferenceSkin, SurfacePoint, VertexIdx};
+use wide::{i16x16, i32x16};
+
+use super::groups::{Groups, Planar};
+use crate::lanes::{F, LANES};
+
+/// Anchors that are blended.
+const BLENDED: usize = 3;
+/// Anchors that a vertex knows.
+const KNOWN: usize = 8;
+/// Entry of a vertex that a map does not reach.
+const UNREACHED: i16 = i16::MIN;
+/// Coordinate of a vertex that a map does not reach, in units of its radius.
+const FAR: f32 = 1e6;
+
+/// How a skin is laid out around a contact point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChartOptions {
+    /// Coordinates reach this far from the contact point \[m\].
+    pub radius_m: f64,
+    /// Distance of anchors \[m\].
+    pub anchor_spacing_m: f64,
+    /// Vertices whose normals differ by more than this from that of the contact point are left out \[rad\].
+    pub max_normal_angle: f64,
+    /// Geodesic, or projected.
+    pub coordinates: Coordinates,
+    /// `tau` lies along the tangential part of the first of them that has one.
+    pub axes: [Vector3<f64>; 2],
+}
+
+/// What the coordinates of a vertex are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Coordinates {
+    /// Of the exponential map.
+    Exponential,
+    /// Of the orthogonal projection onto the tangent plane \[SSH12\].
+    Orthogonal,
+}
+
+/// Tables of a skin.
+#[derive(Debug, Clone)]
+pub(crate) struct Charts {
+    options: ChartOptions,
+    groups: Groups,
+    /// Length of one unit of the table \[m\].
+    unit: f32,
+    /// `[anchor][group][axis]`
+    rows: Vec<[i16x16; 2]>,
+    /// Anchors around each vertex, nearest first.
+    known: Vec<Vec<Known>>,
+}
+
+/// An anchor as seen from a vertex.
+#[derive(Debug, Clone, Copy)]
+struct Known {
+    anchor: u32,
+    /// The vertex in the anchor's map \[m\].
+    at: Vector2<f64>,
+    /// From the anchor's map to the frame at the vertex.
+    turn: Rotation2<f64>,
+}
+
+/// The layout around one contact point.
+#[derive(Debug, Clone)]
+pub(crate) struct ChartAt {
+    /// Anchor, and `w_k R_k` in units of the table.
+    terms: [(u32, [[f32; 2]; 2]); BLENDED],
+    n_terms: usize,
+    /// `sum_k w_k R_k q_k(c)`
+    offset: [f32; 2],
+    /// For the projection: contact point and tangents.
+    origin: [f32; 3],
+    tangents: [[f32; 3]; 2],
+    normal: [f32; 3],
+}
+
+impl Charts {
+    pub(crate) fn new(skin: &ReferenceSkin, groups: Groups, options: ChartOptions) -> Self {
+        let reach = options.radius_m + 2.0 * options.anchor_spacing_m;
+        let mut this = Self {
+            unit: (reach / f64::from(i16::MAX)) as f32,
+            rows: Vec::new(),
+            known: vec![Vec::new(); skin.skin().n_vertices()],
+            groups,
+            options,
+        };
+        if options.coordinates == Coordinates::Exponential {
+            this.tabulate(skin, reach);
+        }
+        this
+    }
+
+    fn tabulate(&mut self, skin: &ReferenceSkin, reach: f64) {
+        let maps = ExponentialMaps::new(skin.skin());
+        let normals = skin.vertex_normals();
+        let frames = vertex_frames(skin, &self.options.axes);
+        let neighbours = neighbours(skin);
+        let least = self.options.max_normal_angle.cos();
+        let n = skin.skin().n_vertices();
+        for (anchor, source) in anchors(skin, self.options.anchor_spacing_m).into_iter().enumerate() {
+            let own = normals[source.index()];
+            let mapped = maps.around(source, reach, |v| normals[v.index()].dot(&own) >= least);
+            let mut at: Vec<Option<Vector2<f64>>> = vec![None; n];
+            mapped.iter().for_each(|(v, q)| at[v.index()] = Some(*q));
+            for (v, q) in mapped.iter().take_while(|(_, q)| q.norm() < 3.0 * self.options.anchor_spacing_m) {
+                if let Some(turn) = turn(skin, &frames[v.index()], &neighbours[v.index()], v.index(), &at) {
+                    self.known[v.index()].push(Known { anchor: anchor as u32, at: *q, turn });
+                }
+            }
+            self.push_row(&at);
+        }
+        for known in &mut self.known {
+            known.sort_by(|a, b| a.at.norm_squared().total_cmp(&b.at.norm_squared()));
+            known.truncate(KNOWN);
+        }
+    }
+
+    fn push_row(&mut self, at: &[Option<Vector2<f64>>]) {
+        let entry = |v: usize, axis: usize| match at.get(v).copied().flatten() {
+            Some(q) => (q[axis] / f64::from(self.unit)).round() as i16,
+            None => UNREACHED,
+        };
+        for group in 0..self.groups.n() {
+            let axis = |axis| i16x16::new(std::array::from_fn(|lane| entry(group * LANES + lane, axis)));
+            self.rows.push([axis(0), axis(1)]);
+        }
+    }
+
+    /// Around a point of the reference skin with its frame. `None` where no map reaches.
+    pub(crate) fn at(&self, corners: [VertexIdx; 3], point: &SurfacePoint, frame: &ContactFrame) -> Option<ChartAt> {
+        let row = |v: &Vector3<f64>| [v.x as f32, v.y as f32, v.z as f32];
+        let mut chart = ChartAt {
+            terms: [(0, [[0.0; 2]; 2]); BLENDED],
+            n_terms: 0,
+            offset: [0.0; 2],
+            origin: row(&point.position.coords),
+            tangents: [row(&frame.tau), row(&frame.theta)],
+            normal: row(&frame.normal),
+        };
+        if self.options.coordinates == Coordinates::Orthogonal {
+            return Some(chart);
+        }
+        let mut found = Nearest::default();
+        for corner in corners {
+            for known in &self.known[corner.index()] {
+                if !found.holds(known.anchor)
+                    && let Some(known) = self.seen_from(known.anchor, corners, point.weights)
+                {
+                    found.offer(known);
+                }
+            }
+        }
+        let end = found.end()?;
+        let weight = |k: &Known| (1.0 - k.at.norm() / end).max(1e-6).powi(2);
+        let total: f64 = found.blended().map(weight).sum();
+        for known in found.blended() {
+            let matrix = known.turn.matrix() * (weight(known) / total);
+            let shift = matrix * known.at;
+            let scaled = |r: usize, c: usize| matrix[(r, c)] as f32 * self.unit;
+            chart.terms[chart.n_terms] = (known.anchor, [[scaled(0, 0), scaled(0, 1)], [scaled(1, 0), scaled(1, 1)]]);
+            chart.n_terms += 1;
+            chart.offset[0] += shift.x as f32;
+            chart.offset[1] += shift.y as f32;
+        }
+        Some(chart)
+    }
+
+    /// An anchor as seen from a point of a triangle, if all corners know it.
+    fn seen_from(&self, anchor: u32, corners: [VertexIdx; 3], weights: [f64; 3]) -> Option<Known> {
+        let (mut at, mut cos, mut sin) = (Vector2::zeros(), 0.0, 0.0);
+        for (corner, weight) in corners.iter().zip(weights) {
+            let known = self.known[corner.index()].iter().find(|k| k.anchor == anchor)?;
+            at += known.at * weight;
+            cos += known.turn.matrix()[(0, 0)] * weight;
+            sin += known.turn.matrix()[(1, 0)] * weight;
+        }
+        Some(Known { anchor, at, turn: Rotation2::new(sin.atan2(cos)) })
+    }
+
+    /// Coordinates of all vertices \[m\]; those that are not reached are far away.
+    pub(crate) fn lay_out(&self, chart: &ChartAt, rest: &Planar, normals: &Planar, out: &mut [[F; 2]]) {
+        match self.options.coordinates {
+            Coordinates::Exponential => self.blend(chart, out),
+            Coordinates::Orthogonal => self.project(chart, rest, normals, out),
+        }
+    }
+
+    fn blend(&self, chart: &ChartAt, out: &mut [[F; 2]]) {
+        let n_groups = self.groups.n();
+        let rows = |anchor: u32| &self.rows[anchor as usize * n_groups..][..n_groups];
+        let unreached = F::splat(f32::from(UNREACHED));
+        out.fill([F::splat(-chart.offset[0]), F::splat(-chart.offset[1])]);
+        for (anchor, m) in &chart.terms[..chart.n_terms] {
+            let m = m.map(|r| r.map(F::splat));
+            for (q, row) in out.iter_mut().zip(rows(*anchor)) {
+                let [x, y] = row.map(|r| F::from_i32x16(i32x16::from_i16x16(r)));
+                let is_far = x.simd_eq(unreached);
+                q[0] = is_far.bitselect(F::splat(FAR), m[0][0].mul_add(x, m[0][1].mul_add(y, q[0])));
+                q[1] = m[1][0].mul_add(x, m[1][1].mul_add(y, q[1]));
+            }
+        }
+        // A far vertex stays far, whatever other maps say.
+        for q in out {
+            let is_far = q[0].abs().simd_gt(F::splat(0.5 * FAR));
+            q[0] = is_far.bitselect(F::splat(FAR), q[0]);
+        }
+    }
+
+    fn project(&self, chart: &ChartAt, rest: &Planar, normals: &Planar, out: &mut [[F; 2]]) {
+        let least = F::splat(self.options.max_normal_angle.cos() as f32);
+        for (g, q) in out.iter_mut().enumerate() {
+            let from = |a: &[f32; 3], v: [F; 3]| {
+                v[0].mul_add(F::splat(a[0]), v[1].mul_add(F::splat(a[1]), v[2] * F::splat(a[2])))
+            };
+            let offset: [F; 3] = std::array::from_fn(|k| rest.axis(k)[g] - F::splat(chart.origin[k]));
+            let normal = std::array::from_fn(|k| normals.axis(k)[g]);
+            let turns_away = from(&chart.normal, normal).simd_lt(least);
+            q[0] = turns_away.bitselect(F::splat(FAR), from(&chart.tangents[0], offset));
+            q[1] = from(&chart.tangents[1], offset);
+        }
+    }
+
+    /// Bytes of the tables.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(self.rows.as_slice())
+    }
+}
+
+/// The nearest anchors, nearest first; the last one only says where weights end.
+#[derive(Default)]
+struct Nearest {
+    kept: [Option<Known>; BLENDED + 1],
+}
+
+impl Nearest {
+    fn holds(&self, anchor: u32) -> bool {
+        self.kept.iter().flatten().any(|k| k.anchor == anchor)
+    }
+
+    fn offer(&mut self, known: Known) {
+        let mut next = Some(known);
+        for slot in &mut self.kept {
+            let is_nearer = |n: &Known| slot.is_none_or(|k: Known| n.at.norm() < k.at.norm());
+            if next.as_ref().is_some_and(is_nearer) {
+                std::mem::swap(slot, &mut next);
+            }
+        }
+    }
+
+    /// Those that are blended.
+    fn blended(&self) -> impl Iterator<Item = &Known> + Clone {
+        self.kept[..BLENDED].iter().flatten()
+    }
+
+    /// Distance at which weights are zero, so that anchors come and go without a jump.
+    fn end(&self) -> Option<f64> {
+        let farthest = self.blended().last()?.at.norm();
+        Some(self.kept[BLENDED].map_or(2.0 * farthest, |k| k.at.norm()).max(1e-9))
+    }
+}
+
+/// Farthest-point sampling of vertices until none is farther than `spacing_m` from one of them.
+pub(crate) fn anchors(skin: &ReferenceSkin, spacing_m: f64) -> Vec<VertexIdx> {
+    let positions = skin.skin().positions();
+    let mut distance = vec![f64::INFINITY; positions.len()];
+    let mut chosen = Vec::new();
+    let mut next = 0;
+    while distance[next] > spacing_m {
+        chosen.push(VertexIdx::from_index(next));
+        for (d, p) in distance.iter_mut().zip(positions) {
+            *d = d.min((p - positions[next]).norm());
+        }
+        next = (0..positions.len()).max_by(|a, b| distance[*a].total_cmp(&distance[*b])).unwrap_or(0);
+    }
+    chosen
+}
+
+fn vertex_frames(skin: &ReferenceSkin, axes: &[Vector3<f64>; 2]) -> Vec<ContactFrame> {
+    skin.vertex_normals().iter().map(|n| plica_geometry::frame_around(n, axes)).collect()
+}
+
+fn neighbours(skin: &ReferenceSkin) -> Vec<Vec<usize>> {
+    let mut neighbours = vec![Vec::new(); skin.skin().n_vertices()];
+    for [a, b] in skin.skin().edges() {
+        neighbours[a.index()].push(b.index());
+        neighbours[b.index()].push(a.index());
+    }
+    neighbours
+}
+
+/// The turn that takes edges at a vertex from a map to the frame at the vertex, in the least-squares sense.
+fn turn(
+    skin: &ReferenceSkin,
+    frame: &ContactFrame,
+    neighbours: &[usize],
+    vertex: usize,
+    map: &[Option<Vector2<f64>>],
+) -> Option<Rotation2<f64>> {
+    let positions = skin.skin().positions();
+    let centre = map[vertex]?;
+    let (mut cos, mut sin) = (0.0, 0.0);
+    for &neighbour in neighbours {
+        let edge = positions[neighbour] - positions[vertex];
+        let here = Vector2::new(edge.dot(&frame.tau), edge.dot(&frame.theta)).normalize();
+        let there = (map[neighbour]? - centre).normalize();
+        cos += there.dot(&here);
+        sin += there.perp(&here);
+    }
+    Some(Rotation2::new(sin.atan2(cos)))
+}

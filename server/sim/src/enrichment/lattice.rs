@@ -1,0 +1,135 @@
+//! The grid of texels that a stamp is stored on: square, around the contact point, finer in the middle.
+//!
+//! A coordinate `x` between `-R` and `R` lies at `s = (1 + b) t / (1 + b |t|)`, `t = x / R`: texels are `1 + b` times closer in the
+//! middle than on average, and as much wider at the rim.
+
+use nalgebra::Vector2;
+use plica_geometry::Skin;
+use wide::f32x4;
+
+use crate::lanes::F;
+
+/// `b`
+const STRETCH: f64 = 2.0;
+/// A triangle that a chart stretches by more than this lies across its cut.
+const LARGEST_STRETCH: f64 = 3.0;
+
+/// Texels `[n][n]`, the second coordinate running fastest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Lattice {
+    radius: f64,
+    n: usize,
+}
+
+/// One texel covered by a triangle.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Covered {
+    pub(crate) texel: usize,
+    pub(crate) corners: [usize; 3],
+    pub(crate) weights: [f64; 3],
+}
+
+impl Lattice {
+    pub(crate) fn new(radius: f64, n: usize) -> Self {
+        Self { radius, n }
+    }
+
+    pub(crate) fn n_texels(&self) -> usize {
+        self.n * self.n
+    }
+
+    /// Coordinates of a texel \[m\].
+    pub(crate) fn position(&self, texel: usize) -> Vector2<f64> {
+        let coordinate = |i: usize| {
+            let s = 2.0 * i as f64 / (self.n - 1) as f64 - 1.0;
+            self.radius * s / (1.0 + STRETCH - STRETCH * s.abs())
+        };
+        Vector2::new(coordinate(texel / self.n), coordinate(texel % self.n))
+    }
+
+    /// Where a coordinate lies between texels.
+    fn index(&self, x: f64) -> f64 {
+        let t = x / self.radius;
+        let s = (1.0 + STRETCH) * t / (1.0 + STRETCH * t.abs());
+        0.5 * (s + 1.0) * (self.n - 1) as f64
+    }
+
+    /// The lower texel and the shares of the upper ones, for sixteen points; what lies outside has a negative texel.
+    #[inline(always)]
+    pub(crate) fn locate(&self, q: &[F; 2]) -> ([i32; 16], [f32; 16], [f32; 16]) {
+        let (last, radius) = ((self.n - 1) as f32, F::splat(self.radius as f32));
+        let stretch = F::splat(STRETCH as f32);
+        let place = |x: F| {
+            let t = x / radius;
+            let s = (F::ONE + stretch) * t / stretch.mul_add(t.abs(), F::ONE);
+            (s + F::ONE) * F::splat(0.5 * last)
+        };
+        let (x, y) = (place(q[0]), place(q[1]));
+        let inside = q[0].abs().fast_max(q[1].abs()).simd_le(radius);
+        let cell = |x: F| x.fast_max(F::ZERO).fast_min(F::splat(last - 1.0)).floor();
+        let (i, j) = (cell(x), cell(y));
+        let texel = inside.bitselect(i.mul_add(F::splat(self.n as f32), j), F::splat(-1.0));
+        let index = texel.to_array().map(|t| t as i32);
+        (index, (x - i).to_array(), (y - j).to_array())
+    }
+
+    /// The same for one point.
+    pub(crate) fn locate_one(&self, q: [f32; 2]) -> (i32, f32, f32) {
+        let (texel, x, y) = self.locate(&q.map(F::splat));
+        (texel[0], x[0], y[0])
+    }
+
+    /// Bilinear between the four texels of a cell; zero outside.
+    #[inline(always)]
+    pub(crate) fn sample(&self, texels: &[f32x4], (texel, x, y): (i32, f32, f32)) -> f32x4 {
+        if texel < 0 {
+            return f32x4::ZERO;
+        }
+        let (texel, n) = (texel as usize, self.n);
+        let (lower, upper) = (&texels[texel..texel + 2], &texels[texel + n..texel + n + 2]);
+        let (x, y) = (f32x4::splat(x), f32x4::splat(y));
+        let low = (lower[1] - lower[0]).mul_add(y, lower[0]);
+        let high = (upper[1] - upper[0]).mul_add(y, upper[0]);
+        (high - low).mul_add(x, low)
+    }
+
+    /// Texels that triangles cover, once a skin is laid out; `None` is what is not reached.
+    pub(crate) fn cover(&self, skin: &Skin, at: &[Option<Vector2<f64>>]) -> Vec<Covered> {
+        let mut covered = Vec::new();
+        for triangle in skin.triangles() {
+            let corners = triangle.map(|v| v.index());
+            let [Some(a), Some(b), Some(c)] = corners.map(|v| at[v]) else { continue };
+            let is_torn = [(0, 1), (1, 2), (2, 0)].iter().any(|&(i, j)| {
+                let there = ([a, b, c][i] - [a, b, c][j]).norm();
+                let here = (skin.positions()[corners[i]] - skin.positions()[corners[j]]).norm();
+                there > LARGEST_STRETCH * here
+            });
+            if !is_torn {
+                self.cover_triangle(corners, [a, b, c], &mut covered);
+            }
+        }
+        covered
+    }
+
+    fn cover_triangle(&self, corners: [usize; 3], at: [Vector2<f64>; 3], covered: &mut Vec<Covered>) {
+        let [a, b, c] = at.map(|q| Vector2::new(self.index(q.x), self.index(q.y)));
+        let doubled = (b - a).perp(&(c - a));
+        if doubled.abs() < 1e-12 {
+            return;
+        }
+        let range = |k: usize| {
+            let (low, high) = (a[k].min(b[k]).min(c[k]), a[k].max(b[k]).max(c[k]));
+            low.ceil().max(0.0) as i64..=high.floor().min((self.n - 1) as f64) as i64
+        };
+        for i in range(0) {
+            for j in range(1) {
+                let p = Vector2::new(i as f64, j as f64);
+                let (v, w) = ((p - a).perp(&(c - a)) / doubled, (b - a).perp(&(p - a)) / doubled);
+                let weights = [1.0 - v - w, v, w];
+                if weights.iter().all(|w| *w >= -1e-9) {
+                    covered.push(Covered { texel: i as usize * self.n + j as usize, corners, weights });
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! Enrichment: what the coarse skin misses, learned from examples \[SSH12, 5\].
+//!
+//! For each contact the skin is laid out around the contact point ([`charts`]), a correlator weighs the examples by their likeness
+//! to the present state, and an interpolator ([`field`]) lays their detail on the skin. An [`Enricher`] is one such way with its
+//! tables; it never changes.
+
+mod charts;
+mod enricher;
+mod fade;
+mod field;
+mod groups;
+mod kriging;
+mod lattice;
+mod linear;
+mod modes;
+mod rbf;
+mod rescale;
+mod situation;
+mod ssh12;
+mod stencil;
+mod warp;
+
+pub use charts::{ChartOptions, Coordinates};
+pub use enricher::{Correlator, Enricher, EnricherError, EnricherScratch, EnrichmentOptions, Examples};
+pub use field::{FieldOptions, Interpolator};
+pub use kriging::KrigingChoice;
+pub use linear::LinearKind;
+pub use modes::Precision;
+pub use situation::Touch;
+pub use ssh12::Ssh12Options;

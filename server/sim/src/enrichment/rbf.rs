@@ -1,0 +1,44 @@
+//! Correlation by the position of the tool with radial basis functions, as in PhyNNeSS \[DDSA11\]: `w = K^-1 k`,
+//! `k_i = exp(-|p - p_i|^2 / (2 l^2))`. Nothing of the state enters but where the tool is.
+
+use nalgebra::{DMatrix, Vector3};
+
+use super::situation::Situation;
+
+/// Share of the diagonal that keeps the matrix regular.
+const NUGGET: f64 = 1e-6;
+
+/// Weights by the position of the tool.
+#[derive(Debug, Clone)]
+pub(crate) struct Rbf {
+    positions: Vec<Vector3<f32>>,
+    width: f32,
+    /// `K^-1`, `[n][n]`
+    inverse: Vec<f32>,
+}
+
+impl Rbf {
+    /// With the width `l` \[m\].
+    pub(crate) fn new(situations: &[Situation<'_>], width: f64) -> Option<Self> {
+        let positions: Vec<_> = situations.iter().map(|s| s.tool_origin).collect();
+        let n = positions.len();
+        let kernel = |i: usize, j: usize| f64::from(between(&positions[i], &positions[j], width as f32));
+        let matrix = DMatrix::from_fn(n, n, kernel) + DMatrix::identity(n, n) * NUGGET;
+        let inverse = matrix.cholesky()?.inverse().transpose().iter().map(|v| *v as f32).collect();
+        Some(Self { positions, width: width as f32, inverse })
+    }
+
+    /// Writes `w`; `scratch` holds at least `n` numbers.
+    pub(crate) fn weigh(&self, situation: &Situation<'_>, scratch: &mut [f32], weights: &mut [f32]) {
+        let n = self.positions.len();
+        let k = &mut scratch[..n];
+        k.iter_mut().zip(&self.positions).for_each(|(k, p)| *k = between(&situation.tool_origin, p, self.width));
+        for (w, row) in weights.iter_mut().zip(self.inverse.chunks_exact(n)) {
+            *w = row.iter().zip(&*k).map(|(a, b)| a * b).sum();
+        }
+    }
+}
+
+fn between(a: &Vector3<f32>, b: &Vector3<f32>, width: f32) -> f32 {
+    (-(a - b).norm_squared() / (2.0 * width * width)).exp()
+}
