@@ -6,6 +6,7 @@ mod common;
 use std::fs;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
+use plica_geometry::ReferenceSkin;
 use plica_training::*;
 use tempfile::TempDir;
 
