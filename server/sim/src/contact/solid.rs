@@ -95,6 +95,23 @@ impl Solid {
         [low, high]
     }
 
+    /// Signed distance of a local point \[m\] and the outward normal there.
+    pub(crate) fn distance(&self, p: &V3) -> (f32, V3) {
+        match self {
+            Self::Round { a, b, radius } => {
+                let from_axis = p - (a + (b - a) * nearest_on_segment(p, a, b));
+                let length = from_axis.norm();
+                let normal = if length > 0.0 { from_axis / length } else { V3::z() };
+                (length - radius, normal)
+            }
+            Self::Polytopes(parts) => {
+                let nearer = |a: (f32, V3), b: (f32, V3)| if b.0 < a.0 { b } else { a };
+                parts.iter().map(|part| part.distance(p)).reduce(nearer).unwrap_or((f32::INFINITY, V3::z()))
+            }
+            Self::HalfSpace { normal } => (normal.dot(p), *normal),
+        }
+    }
+
     /// Farthest point from the origin \[m\].
     pub(crate) fn reach(&self) -> f32 {
         match self {

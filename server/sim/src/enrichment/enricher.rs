@@ -11,7 +11,7 @@ use super::linear::{Linear, LinearKind};
 use super::modes::Precision;
 use super::rbf::Rbf;
 use super::rescale::Rescale;
-use super::situation::{Situation, Touch};
+use super::situation::{Situation, Touch, coordinates};
 use super::ssh12::{Ssh12, Ssh12Options};
 use super::stencil::Stencil;
 use crate::lanes::{F, Node};
@@ -135,6 +135,8 @@ pub struct Enricher {
     n_examples: usize,
     n_nodes: usize,
     choice: Option<KrigingChoice>,
+    /// Of charts \[m\].
+    radius: f32,
 }
 
 #[derive(Debug, Clone)]
@@ -203,7 +205,20 @@ impl Enricher {
         let (correlation, choice) = correlation(model, &reference, options.correlator, &situations, &field, cell)?;
         let Tables { rest, normals, charts, fans, .. } = tables;
         let (n_examples, n_nodes) = (taught.0.len(), model.n_nodes());
-        Ok(Self { options, fans, rest, normals, charts, correlation, field, n_examples, n_nodes, choice, reference })
+        Ok(Self {
+            options,
+            fans,
+            rest,
+            normals,
+            charts,
+            correlation,
+            field,
+            n_examples,
+            n_nodes,
+            choice,
+            reference,
+            radius: radius as f32,
+        })
     }
 
     /// What it was made with.
@@ -271,7 +286,19 @@ impl Enricher {
         confidence
     }
 
-    /// Nodes of the model that it belongs to.
+    /// The skin vertex nearest to a contact point.
+    pub(crate) fn nearest_vertex(&self, touch: &Touch) -> usize {
+        nearest(self.reference.skin().positions(), &touch.contact_point)
+    }
+
+    /// How much a vertex belongs to the contact that was last evaluated: 1 there, 0 where its chart ends.
+    #[inline(always)]
+    pub(crate) fn closeness(&self, scratch: &EnricherScratch, vertex: usize) -> f32 {
+        let [x, y] = coordinates(&scratch.layout, vertex);
+        (1.0 - (x * x + y * y) / (self.radius * self.radius)).max(0.0).powi(2)
+    }
+
+    /// Whether it was made for such a model.
     pub fn fits(&self, model: &Model) -> bool {
         self.n_nodes == model.n_nodes() && self.reference.skin().n_vertices() == model.n_skin()
     }

@@ -2,9 +2,10 @@
 //!
 //! For each contact the skin is laid out around the contact point ([`charts`]), a correlator weighs the examples by their likeness
 //! to the present state, and an interpolator ([`field`]) lays their detail on the skin. An [`Enricher`] is one such way with its
-//! tables; it never changes.
+//! tables; it never changes. A [`LiveEnrichment`] follows the contacts of a running simulation with one.
 
 mod charts;
+mod clearance;
 mod enricher;
 mod fade;
 mod field;
@@ -12,6 +13,7 @@ mod groups;
 mod kriging;
 mod lattice;
 mod linear;
+mod live;
 mod modes;
 mod rbf;
 mod rescale;
@@ -25,6 +27,7 @@ pub use enricher::{Correlator, Enricher, EnricherError, EnricherScratch, Enrichm
 pub use field::{FieldOptions, Interpolator};
 pub use kriging::KrigingChoice;
 pub use linear::LinearKind;
+pub use live::LiveEnrichment;
 pub use modes::Precision;
 pub use situation::Touch;
 pub use ssh12::Ssh12Options;

@@ -34,15 +34,25 @@ impl Situation<'_> {
     /// Coordinates of a vertex \[m\].
     #[inline(always)]
     pub(crate) fn coordinates(&self, vertex: usize) -> [f32; 2] {
-        let group = &self.layout[vertex / LANES];
-        let lane = vertex % LANES;
-        [0, 1].map(|axis| bytemuck::cast_ref::<F, [f32; LANES]>(&group[axis])[lane])
+        coordinates(self.layout, vertex)
     }
 
     /// Offset of a vertex from rest \[m\].
     #[inline(always)]
     pub(crate) fn offset(&self, vertex: usize) -> Vector3<f32> {
-        let o = self.offsets[vertex];
-        Vector3::new(o[0], o[1], o[2])
+        vector(&self.offsets[vertex])
     }
+}
+
+/// The first three components.
+#[inline(always)]
+pub(crate) fn vector(node: &Node) -> Vector3<f32> {
+    Vector3::new(node[0], node[1], node[2])
+}
+
+/// Coordinates of a vertex in a layout \[m\].
+#[inline(always)]
+pub(crate) fn coordinates(layout: &[[F; 2]], vertex: usize) -> [f32; 2] {
+    let (group, lane) = (&layout[vertex / LANES], vertex % LANES);
+    [0, 1].map(|axis| bytemuck::cast_ref::<F, [f32; LANES]>(&group[axis])[lane])
 }
