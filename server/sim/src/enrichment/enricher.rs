@@ -92,6 +92,9 @@ const MAX_NORMAL_ANGLE: f64 = 2.2;
 /// Pitch and width of the stencil, in coarse cells.
 const STENCIL_CELLS: [f64; 2] = [2.0 / 3.0, 1.0];
 
+/// Examples whose displacements differ by less than this share are one.
+const DUPLICATE: f64 = 5e-3;
+
 /// Why there is no enricher.
 #[derive(Debug, thiserror::Error)]
 pub enum EnricherError {
@@ -148,6 +151,19 @@ enum Correlation {
     Kriging(Box<Kriging>),
 }
 
+impl Correlation {
+    /// Writes the weights `[n]` and returns the confidence.
+    fn weigh(&self, situation: &Situation<'_>, kernel: &mut [f32], weights: &mut [f32]) -> f32 {
+        match self {
+            Self::None => 1.0,
+            Self::Ssh12(ssh12) => ssh12.weigh(situation, weights),
+            Self::Linear(linear) => linear.weigh(situation, weights),
+            Self::Rbf(rbf) => rbf.weigh(situation, kernel, weights),
+            Self::Kriging(kriging) => kriging.weigh(situation, kernel, weights),
+        }
+    }
+}
+
 /// Scratch of an evaluation; means nothing between calls.
 #[derive(Debug, Clone)]
 pub struct EnricherScratch {
@@ -172,6 +188,7 @@ impl Enricher {
     /// See [`EnricherError`].
     pub fn new(model: &Model, examples: &Examples, options: EnrichmentOptions) -> Result<Self, EnricherError> {
         check(model, examples)?;
+        let examples = &without_duplicates(examples);
         let skin = &model.description().skin;
         let reference = ReferenceSkin::new(skin);
         let groups = Groups::new(skin.n_vertices());
@@ -231,6 +248,11 @@ impl Enricher {
         self.choice
     }
 
+    /// Radius of the chart around a contact point \[m\].
+    pub fn radius_m(&self) -> f64 {
+        f64::from(self.radius)
+    }
+
     /// Bytes of tables: those of the charts, and those of the examples.
     pub fn bytes(&self) -> [usize; 2] {
         [self.charts.bytes(), self.field.bytes()]
@@ -259,31 +281,41 @@ impl Enricher {
         detail: &mut [Node],
     ) -> f32 {
         let EnricherScratch { layout, weights, kernel, field } = scratch;
-        let place = place(&self.reference, &self.fans, &self.options.axes, touch);
-        let Some(chart) = self.charts.at(place.corners, &place.point, &place.frame) else {
+        let Some(place) = self.lay_out(touch, layout) else {
             detail.fill([0.0; 4]);
             return 0.0;
         };
-        self.charts.lay_out(&chart, &self.rest, &self.normals, layout);
-        let displacements = &state.u[..model.n_free];
-        let situation = situation(displacements, offsets, layout, &place, touch);
-        let confidence = match &self.correlation {
-            Correlation::None => 1.0,
-            Correlation::Ssh12(ssh12) => ssh12.weigh(&situation, weights),
-            Correlation::Linear(linear) => {
-                linear.weigh(&situation, weights);
-                1.0
-            }
-            Correlation::Rbf(rbf) => {
-                rbf.weigh(&situation, kernel, weights);
-                1.0
-            }
-            Correlation::Kriging(kriging) => kriging.weigh(&situation, kernel, weights),
-        };
-        let share =
-            if self.options.fade && matches!(self.correlation, Correlation::Kriging(_)) { confidence } else { 1.0 };
-        self.field.evaluate(&situation, weights, share, field, detail);
+        let situation = situation(&state.u[..model.n_free], offsets, layout, &place, touch);
+        let confidence = self.correlation.weigh(&situation, kernel, weights);
+        let fades = self.options.fade && matches!(self.correlation, Correlation::Kriging(_));
+        self.field.evaluate(&situation, weights, if fades { confidence } else { 1.0 }, field, detail);
         confidence
+    }
+
+    /// Detail with given weights `[n]`, in place of the correlator's: to see what interpolation alone does.
+    pub fn interpolate(
+        &self,
+        model: &Model,
+        state: &State,
+        offsets: &[Node],
+        (touch, weights): (&Touch, &[f32]),
+        scratch: &mut EnricherScratch,
+        detail: &mut [Node],
+    ) {
+        let EnricherScratch { layout, field, .. } = scratch;
+        detail.fill([0.0; 4]);
+        if let Some(place) = self.lay_out(touch, layout) {
+            let situation = situation(&state.u[..model.n_free], offsets, layout, &place, touch);
+            self.field.evaluate(&situation, weights, 1.0, field, detail);
+        }
+    }
+
+    /// Lays the skin out around a contact point; `None` where no chart reaches.
+    fn lay_out(&self, touch: &Touch, layout: &mut [[F; 2]]) -> Option<Place> {
+        let place = place(&self.reference, &self.fans, &self.options.axes, touch);
+        let chart = self.charts.at(place.corners, &place.point, &place.frame)?;
+        self.charts.lay_out(&chart, &self.rest, &self.normals, layout);
+        Some(place)
     }
 
     /// The skin vertex nearest to a contact point.
@@ -407,6 +439,26 @@ fn check(model: &Model, examples: &Examples) -> Result<(), EnricherError> {
     match arrays.into_iter().find(|(_, n)| *n != found) {
         Some((what, n)) => Err(EnricherError::Length { example: 0, what, found: n, expected: found }),
         None => Ok(()),
+    }
+}
+
+/// Of examples that are nearly the same, the first.
+fn without_duplicates(examples: &Examples) -> Examples {
+    let squared = |a: &[[f32; 3]], b: &[[f32; 3]]| -> f64 {
+        a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| f64::from(a - b).powi(2)).sum()
+    };
+    let mut kept: Vec<usize> = Vec::new();
+    for (i, u) in examples.displacements.iter().enumerate() {
+        let nothing = vec![[0.0; 3]; u.len()];
+        let nearest = squared(u, &nothing) * DUPLICATE * DUPLICATE;
+        if kept.iter().all(|k| squared(u, &examples.displacements[*k]) > nearest) {
+            kept.push(i);
+        }
+    }
+    Examples {
+        displacements: kept.iter().map(|i| examples.displacements[*i].clone()).collect(),
+        details: kept.iter().map(|i| examples.details[*i].clone()).collect(),
+        touches: kept.iter().map(|i| examples.touches[*i]).collect(),
     }
 }
 

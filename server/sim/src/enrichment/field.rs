@@ -2,12 +2,15 @@
 //!
 //! A vertex at `q` in the chart of the contact point gets
 //!
-//! `d(p) = W(|q|) sum_i w_i S_i(q) + (1 - W) sum_i w_i D_i(p) - B(|q|) u_c(p)`
+//! `d(p) = sum_i w_i D_i - B(|q|) u_c(p)`, `D_i = d_i + B u_c,i`
 //!
-//! with stamps `S_i`, the examples' `D_i = d_i + B u_c,i` at the vertices, and the window `W`, 1 inside and 0 beyond the chart. The
-//! stamp method is the first term alone, the vector method the second; a blend is both; a warp samples each stamp at
-//! `q - (1 - W) q(c_i)`, which is the stamp near the contact and the example's own place far from it. Stamps are blended first and
-//! sampled once. They are kept in the frame at the contact point and turned with it.
+//! and methods differ in where they look up `D_i`, what is left of an example's detail once the coarse dent is rescaled:
+//!
+//! * vector: at the vertex itself, `D_i(p)`;
+//! * stamp: at the same place relative to the contact, `W S_i(q)`, on a grid of texels in the frame at the contact point, blended
+//!   first and sampled once, with the window `W` that is 1 inside and 0 beyond the chart;
+//! * blend: the stamp, and at the vertex what the stamp misses of its own example, `D_i(p) - W S_i(q_i(p))`;
+//! * warp: at a place between the two, see [`super::warp`].
 
 use nalgebra::{DMatrix, Matrix3, Vector2, Vector3};
 use plica_geometry::ReferenceSkin;
@@ -17,8 +20,8 @@ use super::fade::smoothstep;
 use super::groups::Groups;
 use super::lattice::Lattice;
 use super::modes::{Modes, Precision, gram};
-use super::rescale::{Rescale, distance};
-use super::situation::Situation;
+use super::rescale::Rescale;
+use super::situation::{Situation, vector};
 use super::warp::Warp;
 use crate::lanes::{F, LANES, Node};
 
@@ -77,7 +80,7 @@ pub(crate) struct FieldScratch {
 }
 
 impl Field {
-    /// `details` are the examples', `[n][n_skin]` \[m\], no examples: what rescaling alone does.
+    /// `details` are the examples', `[n][n_skin]` \[m\]; without examples only rescaling is left.
     pub(crate) fn new(
         options: FieldOptions,
         radius: f64,
@@ -85,13 +88,47 @@ impl Field {
         skin: &ReferenceSkin,
         (situations, details): (&[Situation<'_>], &[Vec<[f32; 3]>]),
     ) -> Self {
+        let mut this = Self::without_examples(options, radius, rescale);
+        if situations.is_empty() {
+            return this;
+        }
+        let left: Vec<_> = situations.iter().zip(details).map(|(s, d)| this.left_over(s, d)).collect();
+        let at_vertices = |fields: &[Vec<Vector3<f64>>]| -> Vec<Vec<f64>> {
+            fields.iter().map(|d| planar(Groups::new(d.len()), d)).collect()
+        };
+        let compress = |fields: &[Vec<f64>]| {
+            let products = gram(fields);
+            (Modes::new(fields, &products, options.modes, options.precision), products)
+        };
+        if options.interpolator == Interpolator::Vector {
+            let (vectors, products) = compress(&at_vertices(&left));
+            (this.vectors, this.products) = (Some(vectors), products);
+            return this;
+        }
+        let stamps: Vec<_> = situations.iter().zip(&left).map(|(s, d)| this.stamp(skin, s, d)).collect();
+        let at_texels: Vec<_> = stamps.iter().map(|stamp| planar(this.texel_groups, stamp)).collect();
+        if options.interpolator == Interpolator::Warp {
+            this.products = gram(&at_texels);
+            this.warp = Some(Warp::new(skin.skin(), situations, &left, radius));
+            return this;
+        }
+        let (compressed, products) = compress(&at_texels);
+        (this.stamps, this.products) = (Some(compressed), products);
+        if options.interpolator == Interpolator::Blend {
+            let missed = situations.iter().zip(&stamps).zip(&left).map(|((s, stamp), d)| this.missed(s, stamp, d));
+            this.vectors = Some(compress(&at_vertices(&missed.collect::<Vec<_>>())).0);
+        }
+        this
+    }
+
+    fn without_examples(options: FieldOptions, radius: f64, rescale: &Rescale) -> Self {
         let lattice = Lattice::new(radius, options.texels);
-        let window = |r: f64| f64::from(window(options.window, (r / radius) as f32));
         let shade = |texel| {
             let r = lattice.position(texel).norm();
-            (window(r) * (rescale.at(r) - rescale.far())) as f32
+            let inside = f64::from(window(options.window, (r / radius) as f32));
+            (inside * (rescale.at(r) - rescale.far())) as f32
         };
-        let mut this = Self {
+        Self {
             options,
             radius: radius as f32,
             lattice,
@@ -102,48 +139,36 @@ impl Field {
             stamps: None,
             vectors: None,
             warp: None,
-        };
-        let left = |(s, d): (&Situation<'_>, &Vec<[f32; 3]>)| -> Vec<Vector3<f64>> {
-            let of_vertex = |(v, d): (usize, &[f32; 3])| {
-                let r = distance(s, v);
-                let b = rescale.far() + window(r) * (rescale.at(r) - rescale.far());
-                Vector3::from(d.map(f64::from)) + s.offset(v).cast::<f64>() * b
-            };
-            d.iter().enumerate().map(of_vertex).collect()
-        };
-        let left: Vec<Vec<Vector3<f64>>> = situations.iter().zip(details).map(left).collect();
-        if left.is_empty() {
-            return this;
         }
-        let (modes, precision) = (options.modes, options.precision);
-        if options.interpolator != Interpolator::Vector {
-            let stamps: Vec<Vec<Vector3<f64>>> =
-                situations.iter().zip(&left).map(|(s, d)| this.stamp(skin, s, d)).collect();
-            if options.interpolator == Interpolator::Warp {
-                let fields: Vec<_> = stamps.iter().map(|s| planar(this.texel_groups, s)).collect();
-                this.products = gram(&fields);
-                this.warp = Some(Warp::new(skin, situations, stamps));
-            } else {
-                let weighted = |stamp: &Vec<Vector3<f64>>| {
-                    let share = |t: usize| window(lattice.position(t).norm());
-                    let scaled: Vec<_> = stamp.iter().enumerate().map(|(t, d)| d * share(t)).collect();
-                    planar(this.texel_groups, &scaled)
-                };
-                let fields: Vec<_> = stamps.iter().map(weighted).collect();
-                this.products = gram(&fields);
-                this.stamps = Some(Modes::new(&fields, &this.products, modes, precision));
-            }
-        }
-        if matches!(options.interpolator, Interpolator::Vector | Interpolator::Blend) {
-            let groups = Groups::new(skin.skin().n_vertices());
-            let fields: Vec<_> = left.iter().map(|d| planar(groups, d)).collect();
-            this.products = gram(&fields);
-            this.vectors = Some(Modes::new(&fields, &this.products, modes, precision));
-        }
-        this
     }
 
-    /// Detail at texels in the frame at the contact point; zero where the skin does not reach.
+    /// `D_i = d_i + B u_c,i`, with the same `B` as at run time.
+    fn left_over(&self, situation: &Situation<'_>, detail: &[[f32; 3]]) -> Vec<Vector3<f64>> {
+        let shade: Vec<f32x4> = self.shade.iter().map(|s| f32x4::splat(*s)).collect();
+        let of_vertex = |(v, d): (usize, &[f32; 3])| {
+            let place = self.lattice.locate_one(situation.coordinates(v));
+            let b = f64::from(self.far + self.lattice.sample(&shade, place).to_array()[0]);
+            Vector3::from(d.map(f64::from)) + situation.offset(v).cast::<f64>() * b
+        };
+        detail.iter().enumerate().map(of_vertex).collect()
+    }
+
+    /// `D_i(p) - W S_i(q_i(p))`, `stamp` being `W S_i`.
+    fn missed(&self, situation: &Situation<'_>, stamp: &[Vector3<f64>], left: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let world = situation.frame.transpose().cast::<f64>();
+        let texel = |d: &Vector3<f64>| {
+            let d = world * d;
+            f32x4::new([d.x as f32, d.y as f32, d.z as f32, 0.0])
+        };
+        let texels: Vec<f32x4> = stamp.iter().map(texel).collect();
+        let of_vertex = |(v, d): (usize, &Vector3<f64>)| {
+            let sampled = self.lattice.sample(&texels, self.lattice.locate_one(situation.coordinates(v)));
+            d - vector(&sampled.to_array()).cast::<f64>()
+        };
+        left.iter().enumerate().map(of_vertex).collect()
+    }
+
+    /// `W S_i` in the frame at the contact point; zero where the skin does not reach.
     fn stamp(&self, skin: &ReferenceSkin, situation: &Situation<'_>, detail: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         let reach = 1.5 * f64::from(self.radius);
         let at = |v: usize| {
@@ -155,7 +180,9 @@ impl Field {
         let mut stamp = vec![Vector3::zeros(); self.lattice.n_texels()];
         for covered in self.lattice.cover(skin.skin(), &at) {
             let mixed: Vector3<f64> = covered.corners.iter().zip(covered.weights).map(|(v, w)| detail[*v] * w).sum();
-            stamp[covered.texel] = frame * mixed;
+            let r = self.lattice.position(covered.texel).norm();
+            let inside = f64::from(window(self.options.window, r as f32 / self.radius));
+            stamp[covered.texel] = frame * mixed * inside;
         }
         stamp
     }
@@ -199,7 +226,7 @@ impl Field {
             }
         }
         if let Some(warp) = &self.warp {
-            warp.add(situation, weights, share, (&self.lattice, self.radius, self.options.window), out);
+            warp.add(situation, weights, share, self.options.window, out);
         }
         if let Some(vectors) = &self.vectors {
             vectors.blend(weights, coefficients, planar);
@@ -236,14 +263,11 @@ impl Field {
 
     fn add_vectors(&self, situation: &Situation<'_>, planar: &[F], share: f32x4, out: &mut [Node]) {
         let n = situation.layout.len();
-        let is_blend = self.stamps.is_some();
         for (g, out) in out.chunks_mut(LANES).enumerate() {
             let axes: [[f32; LANES]; 3] = std::array::from_fn(|k| planar[k * n + g].to_array());
             for (lane, out) in out.iter_mut().enumerate() {
-                let [x, y] = situation.coordinates(g * LANES + lane);
-                let inside = if is_blend { window(self.options.window, x.hypot(y) / self.radius) } else { 0.0 };
                 let vector = f32x4::new([axes[0][lane], axes[1][lane], axes[2][lane], 0.0]);
-                *out = (vector * f32x4::splat(1.0 - inside)).mul_add(share, f32x4::from(*out)).to_array();
+                *out = vector.mul_add(share, f32x4::from(*out)).to_array();
             }
         }
     }

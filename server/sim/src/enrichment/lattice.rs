@@ -99,12 +99,7 @@ impl Lattice {
         for triangle in skin.triangles() {
             let corners = triangle.map(|v| v.index());
             let [Some(a), Some(b), Some(c)] = corners.map(|v| at[v]) else { continue };
-            let is_torn = [(0, 1), (1, 2), (2, 0)].iter().any(|&(i, j)| {
-                let there = ([a, b, c][i] - [a, b, c][j]).norm();
-                let here = (skin.positions()[corners[i]] - skin.positions()[corners[j]]).norm();
-                there > LARGEST_STRETCH * here
-            });
-            if !is_torn {
+            if !is_torn(skin, corners, [a, b, c]) {
                 self.cover_triangle(corners, [a, b, c], &mut covered);
             }
         }
@@ -132,4 +127,12 @@ impl Lattice {
             }
         }
     }
+}
+
+/// Whether a chart stretches a triangle so much that it must lie across the chart's cut.
+pub(crate) fn is_torn(skin: &Skin, corners: [usize; 3], at: [Vector2<f64>; 3]) -> bool {
+    [(0, 1), (1, 2), (2, 0)].iter().any(|&(i, j)| {
+        let here = (skin.positions()[corners[i]] - skin.positions()[corners[j]]).norm();
+        (at[i] - at[j]).norm() > LARGEST_STRETCH * here
+    })
 }

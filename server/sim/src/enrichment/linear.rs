@@ -72,12 +72,13 @@ impl Linear {
         Some(Self { rows })
     }
 
-    /// Writes `w`.
-    pub(crate) fn weigh(&self, situation: &Situation<'_>, weights: &mut [f32]) {
+    /// Writes `w`; knows no doubt.
+    pub(crate) fn weigh(&self, situation: &Situation<'_>, weights: &mut [f32]) -> f32 {
         let u = situation.displacements;
         for (w, row) in weights.iter_mut().zip(self.rows.chunks_exact(u.len())) {
             *w = product(row, u);
         }
+        1.0
     }
 }
 

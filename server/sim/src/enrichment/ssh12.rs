@@ -2,7 +2,7 @@
 //!
 //! Departures, with reasons in MATH.md: the kernel acts on the distance `x_i = 1 - r_i` (as printed, on `r_i`, an exact match would
 //! have no weight); it is shifted to reach zero, `G' = (G - e^-4) / (1 - e^-4)`; a null example of weight `g_0` fades detail out before
-//! the last example leaves the kernel; near-duplicates do not narrow it; `|u| / |u[i]|` is bounded.
+//! the last example leaves the kernel; `|u| / |u[i]|` is bounded.
 
 use crate::lanes::Node;
 
@@ -29,8 +29,6 @@ impl Default for Ssh12Options {
 const LARGEST_RATIO: f32 = 1.25;
 /// Weights that are kept.
 const KEPT: usize = 10;
-/// Examples nearer than this are one.
-const DUPLICATE: f64 = 1e-3;
 /// Least `sigma`.
 const LEAST_WIDTH: f64 = 0.02;
 /// `e^-4`: the kernel at the end of its support, `x = 2 sigma`.
@@ -89,12 +87,11 @@ impl Ssh12 {
     }
 }
 
-/// Mean distance to the `n` nearest examples that are no duplicates.
+/// Mean distance to the `n` nearest examples.
 fn width(directions: &[Vec<Node>], n: usize) -> f64 {
     let mean = |i: usize| {
         let distance = |j: usize| f64::from(1.0 - product(&directions[i], &directions[j]));
         let mut distances: Vec<f64> = (0..directions.len()).filter(|j| *j != i).map(distance).collect();
-        distances.retain(|d| *d >= DUPLICATE);
         distances.sort_by(f64::total_cmp);
         distances.truncate(n);
         (!distances.is_empty()).then(|| distances.iter().sum::<f64>() / distances.len() as f64)

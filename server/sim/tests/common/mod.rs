@@ -6,6 +6,7 @@
     reason = "each test binary uses a part of this, and a broken scene should fail loudly"
 )]
 
+pub mod examples;
 pub mod forces;
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
