@@ -280,13 +280,26 @@ impl Enricher {
         scratch: &mut EnricherScratch,
         detail: &mut [Node],
     ) -> f32 {
+        self.evaluate_within([0.0, 1.0], &state.u[..model.n_free], offsets, touch, scratch, detail)
+    }
+
+    /// The same with bounds for the confidence.
+    pub(crate) fn evaluate_within(
+        &self,
+        [least, most]: [f32; 2],
+        displacements: &[Node],
+        offsets: &[Node],
+        touch: &Touch,
+        scratch: &mut EnricherScratch,
+        detail: &mut [Node],
+    ) -> f32 {
         let EnricherScratch { layout, weights, kernel, field } = scratch;
         let Some(place) = self.lay_out(touch, layout) else {
             detail.fill([0.0; 4]);
             return 0.0;
         };
-        let situation = situation(&state.u[..model.n_free], offsets, layout, &place, touch);
-        let confidence = self.correlation.weigh(&situation, kernel, weights);
+        let situation = situation(displacements, offsets, layout, &place, touch);
+        let confidence = self.correlation.weigh(&situation, kernel, weights).clamp(least, most);
         let fades = self.options.fade && matches!(self.correlation, Correlation::Kriging(_));
         self.field.evaluate(&situation, weights, if fades { confidence } else { 1.0 }, field, detail);
         confidence

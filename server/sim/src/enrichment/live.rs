@@ -14,12 +14,14 @@ use crate::model::Model;
 use crate::state::State;
 use crate::step::placement;
 
-/// Time in which one window of a tool takes over from another \[s\].
+/// Time in which one window of a tool takes over from another, and confidence may rise from 0 to 1 \[s\].
 const HAND_OVER_S: f32 = 0.05;
 /// A contact point that moves farther than this in a tick is another contact, in coarse cells.
 const JUMP_CELLS: f64 = 0.25;
-/// A held window ends when the skin under it has gone back to this share of its offset at release.
+/// A held window ends when the skin under it has gone back to this share of its offset at release ...
 const RECOVERED: f32 = 0.02;
+/// ... and has stayed there for so long: it swings \[s\].
+const RECOVERED_S: f32 = 0.1;
 /// Least share of a window where its chart does not reach, so that somebody owns every vertex.
 const LEAST_CLOSENESS: f32 = 1e-3;
 
@@ -29,8 +31,19 @@ struct Window {
     touch: Touch,
     /// Between 0 and 1: how far it has taken over.
     gain: f32,
-    /// Once released: the vertex under it and its offset then \[m\].
-    released: Option<(usize, f32)>,
+    /// Confidence when it was last laid on the skin, and the tick.
+    laid: Option<(f32, u64)>,
+    released: Option<Released>,
+}
+
+/// What a held window waits for.
+#[derive(Debug, Clone, Copy)]
+struct Released {
+    vertex: usize,
+    /// Of the vertex at release \[m\].
+    offset: f32,
+    /// How long it has been back \[s\].
+    recovered_s: f32,
 }
 
 /// A tool's window, and the one it takes over from.
@@ -38,7 +51,6 @@ struct Window {
 struct ToolWindows {
     current: Option<Window>,
     leaving: Option<Window>,
-    confidence: f32,
 }
 
 /// What enrichment remembers between ticks, with its tables and scratch. Nothing allocates once it is made.
@@ -84,12 +96,12 @@ impl LiveEnrichment {
 
     /// Confidence in the detail of each tool, `[n_tools]`, when a frame was last written; 0 without contact.
     pub fn confidence(&self, tool: usize) -> f32 {
-        self.tools[tool].confidence
+        self.tools[tool].confidence()
     }
 
     /// Least confidence over the tools with a window when a frame was last written; 0 is the plain coarse skin.
     pub fn least_confidence(&self) -> f32 {
-        let with_window = self.tools.iter().filter(|t| t.current.is_some()).map(|t| t.confidence);
+        let with_window = self.tools.iter().filter(|t| t.current.is_some()).map(ToolWindows::confidence);
         with_window.reduce(f32::min).unwrap_or(0.0)
     }
 
@@ -107,7 +119,8 @@ impl LiveEnrichment {
                 let tool_origin = reading.proxy.translation.vector.into();
                 windows.touch(Touch { contact_point: reading.reference_contact_point_m, tool_origin }, jump);
             } else {
-                windows.hold(&self.enricher, |vertex| offset(state, &self.rest, vertex));
+                let offset = |vertex| offset(state, &self.rest, vertex);
+                windows.hold(&self.enricher, offset, model.timestep_s() as f32);
             }
         }
     }
@@ -129,75 +142,106 @@ impl LiveEnrichment {
         }
     }
 
-    /// Tool, whether it is the tool's present window, and the window.
-    fn windows(&self) -> impl Iterator<Item = (usize, bool, Window)> + '_ {
-        let of_tool = |(tool, w): (usize, &ToolWindows)| {
-            [w.current.map(|c| (tool, true, c)), w.leaving.map(|l| (tool, false, l))]
-        };
-        self.tools.iter().enumerate().flat_map(of_tool).flatten()
+    fn windows(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..2 * self.tools.len()).filter(|slot| self.tools[slot / 2].slot(*slot).is_some())
+    }
+
+    /// Evaluates the window in a slot into `detail`; its gain.
+    fn lay(&mut self, slot: usize, model: &Model, state: &State, detail: &mut [Node]) -> f32 {
+        let Some(window) = self.tools[slot / 2].slot_mut(slot) else { return 0.0 };
+        let bounds = window.confidence_bounds(state.tick(), model.timestep_s() as f32 / HAND_OVER_S);
+        let displacements = &state.u[..model.n_free];
+        let (touch, offsets, scratch) = (&window.touch, &self.offsets, &mut self.scratch);
+        let confidence = self.enricher.evaluate_within(bounds, displacements, offsets, touch, scratch, detail);
+        window.laid = Some((confidence, state.tick()));
+        window.gain
     }
 
     fn lay_one(&mut self, model: &Model, state: &State) {
-        let Some((tool, is_current, window)) = self.windows().next() else { return };
-        let (offsets, scratch) = (&self.offsets, &mut self.scratch);
-        let confidence = self.enricher.evaluate(model, state, offsets, &window.touch, scratch, &mut self.total);
-        if window.gain < 1.0 {
-            self.total.iter_mut().for_each(|d| *d = d.map(|c| c * window.gain));
+        let Some(slot) = self.windows().next() else { return };
+        let mut total = std::mem::take(&mut self.total);
+        let gain = self.lay(slot, model, state, &mut total);
+        if gain < 1.0 {
+            total.iter_mut().for_each(|d| *d = d.map(|c| c * gain));
         }
-        if is_current {
-            self.tools[tool].confidence = confidence;
-        }
+        self.total = total;
     }
 
     /// `d = sum_a g_a h_a d_a / max(sum_a g_a h_a, max_a h_a)` with gains `g` and closeness `h`.
     fn lay_all(&mut self, model: &Model, state: &State) {
         self.total.fill([0.0; 4]);
         self.shares.fill([0.0; 2]);
-        for index in 0..2 * self.tools.len() {
-            let windows = self.tools[index / 2];
-            let is_current = index % 2 == 0;
-            let Some(window) = (if is_current { windows.current } else { windows.leaving }) else { continue };
-            let (offsets, scratch) = (&self.offsets, &mut self.scratch);
-            let confidence = self.enricher.evaluate(model, state, offsets, &window.touch, scratch, &mut self.detail);
-            if is_current {
-                self.tools[index / 2].confidence = confidence;
+        let mut detail = std::mem::take(&mut self.detail);
+        for slot in 0..2 * self.tools.len() {
+            if self.tools[slot / 2].slot(slot).is_none() {
+                continue;
             }
-            let sums = self.total.iter_mut().zip(&mut self.shares).zip(&self.detail);
+            let gain = self.lay(slot, model, state, &mut detail);
+            let sums = self.total.iter_mut().zip(&mut self.shares).zip(&detail);
             for (vertex, ((total, [sum, largest]), detail)) in sums.enumerate() {
                 let closeness = self.enricher.closeness(&self.scratch, vertex).max(LEAST_CLOSENESS);
-                let share = window.gain * closeness;
-                (0..3).for_each(|k| total[k] += share * detail[k]);
-                *sum += share;
+                (0..3).for_each(|k| total[k] += gain * closeness * detail[k]);
+                *sum += gain * closeness;
                 *largest = largest.max(closeness);
             }
         }
+        self.detail = detail;
         for (total, [sum, largest]) in self.total.iter_mut().zip(&self.shares) {
             *total = total.map(|c| c / sum.max(*largest));
         }
     }
 }
 
+impl Window {
+    fn new(touch: Touch, gain: f32) -> Self {
+        Self { touch, gain, laid: None, released: None }
+    }
+
+    /// Confidence may move by `step` a tick, so that detail does not pop; at first it is what it is, as there is no detail yet.
+    fn confidence_bounds(&self, tick: u64, step: f32) -> [f32; 2] {
+        self.laid.map_or([0.0, 1.0], |(confidence, before)| {
+            let most = step * tick.saturating_sub(before) as f32;
+            [(confidence - most).max(0.0), (confidence + most).min(1.0)]
+        })
+    }
+}
+
 impl ToolWindows {
+    /// Even slots hold present windows, odd ones those that leave.
+    fn slot(&self, slot: usize) -> Option<&Window> {
+        if slot.is_multiple_of(2) { self.current.as_ref() } else { self.leaving.as_ref() }
+    }
+
+    fn slot_mut(&mut self, slot: usize) -> Option<&mut Window> {
+        if slot.is_multiple_of(2) { self.current.as_mut() } else { self.leaving.as_mut() }
+    }
+
+    fn confidence(&self) -> f32 {
+        self.current.and_then(|w| w.laid).map_or(0.0, |(confidence, _)| confidence)
+    }
+
     fn touch(&mut self, touch: Touch, jump: f64) {
         let is_elsewhere = |w: &Window| (w.touch.contact_point - touch.contact_point).norm() > jump;
         match &mut self.current {
             Some(current) if !is_elsewhere(current) => (current.touch, current.released) = (touch, None),
             Some(current) => {
                 self.leaving = Some(*current);
-                *current = Window { touch, gain: 1.0 - current.gain, released: None };
+                *current = Window::new(touch, 1.0 - current.gain);
             }
-            None => self.current = Some(Window { touch, gain: 1.0, released: None }),
+            None => self.current = Some(Window::new(touch, 1.0)),
         }
     }
 
-    fn hold(&mut self, enricher: &Enricher, offset: impl Fn(usize) -> f32) {
+    fn hold(&mut self, enricher: &Enricher, offset: impl Fn(usize) -> f32, dt: f32) {
         let Some(current) = &mut self.current else { return };
-        let (vertex, at_release) = *current.released.get_or_insert_with(|| {
+        let released = current.released.get_or_insert_with(|| {
             let vertex = enricher.nearest_vertex(&current.touch);
-            (vertex, offset(vertex))
+            Released { vertex, offset: offset(vertex), recovered_s: 0.0 }
         });
-        if offset(vertex) <= RECOVERED * at_release {
-            *self = Self { leaving: self.current, ..Self::default() };
+        let is_back = offset(released.vertex) <= RECOVERED * released.offset;
+        released.recovered_s = if is_back { released.recovered_s + dt } else { 0.0 };
+        if released.recovered_s >= RECOVERED_S {
+            *self = Self { current: None, leaving: self.current };
         }
     }
 }

@@ -1,0 +1,199 @@
+//! Enrichment of a running simulation: windows follow, are held, hand over and share; tools stay outside.
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+
+mod common;
+
+use std::sync::{Arc, LazyLock};
+
+use common::examples::{Press, RADIUS, examples, presses, scene, size};
+use common::{Run, at, ball, top, top_normal};
+use nalgebra::{Point3, Vector3};
+use plica_sim::Model;
+use plica_sim::enrichment::*;
+
+static TAUGHT: LazyLock<Vec<Press>> = LazyLock::new(|| presses(32, 1, [[0.02, 0.012], [0.08, 0.048]]));
+
+/// A run with enrichment after every tick.
+struct Enriched {
+    run: Run,
+    live: LiveEnrichment,
+    before: Vec<[f32; 3]>,
+    skin: Vec<[f32; 3]>,
+}
+
+impl Enriched {
+    fn new(n_tools: usize) -> Self {
+        let model = (1..n_tools).fold(scene(), |scene, _| scene.tool(ball(RADIUS))).run().model;
+        let enricher = Enricher::new(&model, &examples(&TAUGHT), EnrichmentOptions::default()).unwrap();
+        let run = Run::new(model);
+        let live = LiveEnrichment::new(&run.model, Arc::new(enricher));
+        let skin = vec![[0.0; 3]; run.model.n_skin()];
+        let mut this = Self { run, live, before: skin.clone(), skin };
+        this.look();
+        this
+    }
+
+    /// A tick with the tools at these places; the skin before and after it.
+    fn tick(&mut self, places: &[Point3<f64>]) {
+        let poses: Vec<_> = places.iter().enumerate().map(|(tool, p)| (tool, at(*p))).collect();
+        self.run.tick(&poses);
+        self.live.follow(&self.run.model, &self.run.state);
+        self.look();
+    }
+
+    fn look(&mut self) {
+        std::mem::swap(&mut self.before, &mut self.skin);
+        self.live.write_skin(&self.run.model, &self.run.state, &mut self.skin);
+    }
+
+    fn glide(&mut self, from: Point3<f64>, to: Point3<f64>, ticks: usize, mut each: impl FnMut(&Self)) {
+        for k in 1..=ticks {
+            self.tick(&[from + (to - from) * (k as f64 / ticks as f64)]);
+            each(self);
+        }
+    }
+
+    fn coarse(&self) -> Vec<[f32; 3]> {
+        let mut coarse = vec![[0.0; 3]; self.run.model.n_skin()];
+        self.run.state.write_skin(&self.run.model, &mut coarse);
+        coarse
+    }
+
+    /// Largest detail on the skin [m].
+    fn detail(&self) -> f64 {
+        apart(&self.skin, &self.coarse())
+    }
+
+    /// Largest change of the skin in the last tick [m].
+    fn change(&self) -> f64 {
+        apart(&self.skin, &self.before)
+    }
+}
+
+fn apart(a: &[[f32; 3]], b: &[[f32; 3]]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| size(&[a[0] - b[0], a[1] - b[1], a[2] - b[2]])).fold(0.0, f64::max)
+}
+
+/// The ball this deep in the top at `x`, `y`.
+fn deep(x: f64, y: f64, depth: f64) -> Point3<f64> {
+    Point3::new(x, y, top(x)) + top_normal() * (RADIUS - depth)
+}
+
+#[test]
+fn detail_follows_a_press_and_is_held_at_release() {
+    let mut it = Enriched::new(1);
+    assert_eq!((it.detail(), it.live.least_confidence()), (0.0, 0.0));
+    it.glide(deep(0.05, 0.03, 0.0), deep(0.05, 0.03, 0.005), 200, |_| ());
+    it.glide(deep(0.05, 0.03, 0.005), deep(0.05, 0.03, 0.005), 100, |_| ());
+    let pressed = it.detail();
+    assert!(pressed > 1e-3 && it.live.least_confidence() > 0.9 && it.live.confidence(0) > 0.9, "{pressed}");
+    // Away at once: the coarse skin takes a while to recover, and detail goes with it, without a step of its own.
+    let away = Point3::new(0.05, 0.03, 0.2);
+    let (mut previous, mut most_drop, mut ticks) = (pressed, 0.0_f64, 0);
+    while it.detail() > 0.01 * pressed && ticks < 3000 {
+        let coarse_before = it.coarse();
+        it.tick(&[away]);
+        let own = (it.detail() - previous).abs();
+        let coarse_step = apart(&it.coarse(), &coarse_before);
+        most_drop = most_drop.max(own - 2.0 * coarse_step);
+        previous = it.detail();
+        ticks += 1;
+    }
+    println!("{:.2} mm of detail; gone {ticks} ticks after release", 1e3 * pressed);
+    assert!(ticks > 5 && ticks < 3000, "{ticks}");
+    assert!(most_drop < 0.02 * pressed, "detail changes by {most_drop} m more than the skin under it");
+    (0..1000).for_each(|_| it.tick(&[away]));
+    assert_eq!(it.detail(), 0.0, "the window is over");
+}
+
+#[test]
+fn a_window_hands_over_to_another_place_without_a_jump() {
+    let mut it = Enriched::new(1);
+    it.glide(deep(0.035, 0.03, 0.0), deep(0.035, 0.03, 0.005), 200, |_| ());
+    let own = it.detail();
+    // Jumps to another place, where it touches the skin that still recovers.
+    let mut largest: f64 = 0.0;
+    it.glide(deep(0.065, 0.03, 0.0005), deep(0.065, 0.03, 0.005), 200, |it| largest = largest.max(it.change()));
+    println!("{:.2} mm of detail, largest change in a tick {:.2} mm", 1e3 * own, 1e3 * largest);
+    assert!(largest < 0.5 * own, "{largest} of {own}");
+}
+
+#[test]
+fn two_tools_share_the_skin() {
+    let place = |y: f64, depth: f64| deep(0.05, y, depth);
+    let press = |it: &mut Enriched, places: [Option<f64>; 2]| {
+        for k in 0..400 {
+            let depth = 0.004 * (f64::from(k) / 200.0).min(1.0);
+            let at = |y: Option<f64>| y.map_or(Point3::new(0.05, 0.03, 0.3), |y| place(y, depth));
+            it.tick(&places.map(at));
+        }
+    };
+    let mut both = Enriched::new(2);
+    press(&mut both, [Some(0.018), Some(0.042)]);
+    let (mut left, mut right) = (Enriched::new(2), Enriched::new(2));
+    press(&mut left, [Some(0.018), None]);
+    press(&mut right, [None, Some(0.042)]);
+    let detail = |it: &Enriched| -> Vec<Vector3<f64>> {
+        let coarse = it.coarse();
+        it.skin.iter().zip(coarse).map(|(s, c)| Vector3::from_fn(|k, _| f64::from(s[k] - c[k]))).collect()
+    };
+    let [both_detail, left_detail, right_detail] = [&both, &left, &right].map(detail);
+    let skin = &both.run.model.description().skin;
+    let around = |y: f64, d: &[Vector3<f64>]| -> f64 {
+        let centre = Point3::new(0.05, y, top(0.05));
+        let near = |p: &Point3<f64>| (p - centre).norm() < 0.01;
+        skin.positions().iter().zip(d).filter(|(p, _)| near(p)).map(|(_, d)| d.norm()).fold(0.0, f64::max)
+    };
+    assert!(both.live.confidence(0) > 0.3 && both.live.confidence(1) > 0.3);
+    assert!(left.live.confidence(1) == 0.0 && right.live.confidence(0) == 0.0);
+    for (y, alone) in [(0.018, &left_detail), (0.042, &right_detail)] {
+        let ratio = around(y, &both_detail) / around(y, alone);
+        println!("at y {y}: {:.2} mm, {ratio:.2} of what the tool has alone", 1e3 * around(y, &both_detail));
+        assert!((0.6..1.7).contains(&ratio), "the near tool decides: {ratio}");
+    }
+    assert!(around(0.042, &both_detail) > 1.3 * around(0.042, &left_detail), "the other tool adds its own");
+}
+
+#[test]
+fn detail_never_pushes_the_skin_into_the_tool() {
+    let mut it = Enriched::new(1);
+    let deepest = |skin: &[[f32; 3]], centre: Point3<f64>| {
+        let gap = |p: &[f32; 3]| (Point3::new(p[0] as f64, p[1] as f64, p[2] as f64) - centre).norm() - RADIUS;
+        skin.iter().map(gap).fold(f64::INFINITY, f64::min)
+    };
+    let mut most: f64 = 0.0;
+    it.glide(deep(0.05, 0.03, 0.0), deep(0.05, 0.03, 0.006), 300, |it| {
+        let centre = Point3::from(it.run.state.tools()[0].proxy.translation.vector);
+        most = most.max(deepest(&it.coarse(), centre).min(0.0) - deepest(&it.skin, centre));
+    });
+    assert!(it.detail() > 1e-3);
+    assert!(most < 1e-6, "{most} m deeper than the coarse skin");
+}
+
+#[test]
+fn a_reset_forgets() {
+    let mut it = Enriched::new(1);
+    it.glide(deep(0.05, 0.03, 0.0), deep(0.05, 0.03, 0.005), 200, |_| ());
+    it.live.forget();
+    it.look();
+    assert_eq!((it.detail(), it.live.least_confidence()), (0.0, 0.0));
+}
+
+#[test]
+fn the_same_twice_is_the_same() {
+    let run = || {
+        let mut it = Enriched::new(1);
+        it.glide(deep(0.05, 0.03, 0.0), deep(0.055, 0.03, 0.005), 100, |_| ());
+        it.skin
+    };
+    assert_eq!(run(), run());
+}
+
+#[test]
+fn an_enricher_knows_its_model() {
+    let model = scene().run().model;
+    let enricher = Enricher::new(&model, &examples(&TAUGHT), EnrichmentOptions::default()).unwrap();
+    assert!(enricher.fits(&model));
+    let other: Model = common::Scene::block(common::E, 0.45).run().model;
+    assert!(!enricher.fits(&other));
+}
