@@ -3,9 +3,12 @@
 
 mod common;
 
+use std::sync::Arc;
+
 use assert_no_alloc::{AllocDisabler, assert_no_alloc, violation_count};
 use common::{E, Run, Scene, at, ball, tool, top, top_normal, turned};
 use nalgebra::{Isometry3, Point3, Vector3};
+use plica_sim::enrichment::{Enricher, EnrichmentOptions, Examples, LiveEnrichment, Touch};
 use plica_sim::*;
 
 #[global_allocator]
@@ -68,10 +71,32 @@ fn pose(k: usize, n: usize) -> Isometry3<f64> {
     turned(p, Vector3::new(0.1 * t.sin(), 0.2, 0.0))
 }
 
+/// Half of the coarse offset taken back, in a dozen states of the crowd.
+fn enrichment(run: &Run) -> LiveEnrichment {
+    let mut taught = crowded(false);
+    let mut examples = Examples::default();
+    for n in 0..600 {
+        taught.tick(&[0, 1, 2, 3].map(|k| (k, pose(k, n))));
+        let reading = taught.state.tools()[0];
+        if n % 50 == 49 && reading.in_contact {
+            let to_f32 = |v: &Vector3<f64>, share: f64| (v * share).cast::<f32>().into();
+            let u = taught.state.node_displacements(&taught.model);
+            examples.displacements.push(u.iter().map(|u| to_f32(u, 1.0)).collect());
+            examples.details.push(taught.offsets().iter().map(|o| to_f32(o, -0.5)).collect());
+            let tool_origin = reading.proxy.translation.vector.into();
+            examples.touches.push(Touch { contact_point: reading.reference_contact_point_m, tool_origin });
+        }
+    }
+    let enricher = Enricher::new(&run.model, &examples, EnrichmentOptions::default()).unwrap();
+    LiveEnrichment::new(&run.model, Arc::new(enricher))
+}
+
 #[test]
 fn ten_thousand_ticks_with_contact_allocate_nothing() {
     let mut run = crowded(true);
-    let (mut touching, mut sleeping, mut fallbacks, mut refused, mut dropped) = (0, 0, 0, 0, 0);
+    let mut live = enrichment(&run);
+    let mut skin = vec![[0.0; 3]; run.model.n_skin()];
+    let (mut enriched, mut touching, mut sleeping, mut fallbacks, mut refused, mut dropped) = (0, 0, 0, 0, 0, 0);
     let mut count = 0;
     for n in 0..10_000_u64 {
         let jumble = if n.is_multiple_of(1500) { f64::NAN } else { 0.0 };
@@ -89,8 +114,13 @@ fn ten_thousand_ticks_with_contact_allocate_nothing() {
         let mut report = TickReport::default();
         count += allocations(|| {
             report = tick(&run.model, input, &mut run.state, &mut run.workspace, &mut NoProbe);
+            live.follow(&run.model, &run.state);
+            if n.is_multiple_of(11) {
+                live.write_skin(&run.model, &run.state, &mut skin);
+            }
         });
         run.clock_s += 1e-3;
+        enriched += u32::from(live.confidence(0) > 0.0);
         touching += u32::from(run.state.tools().iter().any(|t| t.in_contact));
         sleeping += u32::from(report.sleeping);
         (fallbacks, refused) = (fallbacks + report.fallbacks, refused + report.poses_refused);
@@ -98,9 +128,10 @@ fn ten_thousand_ticks_with_contact_allocate_nothing() {
         assert_eq!(count, 0, "tick {n} allocated: {report:?}");
     }
     println!(
-        "{touching} ticks in contact, {sleeping} asleep, {fallbacks} fall-backs, {dropped} rows left out, {refused} poses refused"
+        "{touching} ticks in contact, {sleeping} asleep, {fallbacks} fall-backs, {dropped} rows left out, {refused} poses refused, \
+         {enriched} with detail"
     );
-    assert!(touching > 5000 && sleeping > 100 && refused > 0);
+    assert!(touching > 5000 && sleeping > 100 && refused > 0 && enriched > 100);
 }
 
 #[test]
