@@ -9,10 +9,11 @@
 //! vertices are projected onto the tangent plane \[SSH12, 5.3\].
 
 use nalgebra::{Rotation2, Vector2, Vector3};
-use plica_geometry::{ContactFrame, ExponentialMaps, ReferenceSkin, SurfacePoint, VertexIdx};
+use plica_geometry::{ContactFrame, ExponentialMaps, ReferenceSkin, VertexIdx};
 use wide::{i16x16, i32x16};
 
 use super::groups::{Groups, Planar};
+use super::surface::{Place, Surface};
 use crate::lanes::{F, LANES};
 
 /// Anchors that are blended.
@@ -26,7 +27,7 @@ const FAR: f32 = 1e6;
 
 /// How a skin is laid out around a contact point.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ChartOptions {
+pub(crate) struct ChartOptions {
     /// Coordinates reach this far from the contact point \[m\].
     pub radius_m: f64,
     /// Distance of anchors \[m\].
@@ -35,8 +36,6 @@ pub struct ChartOptions {
     pub max_normal_angle: f64,
     /// Geodesic, or projected.
     pub coordinates: Coordinates,
-    /// `tau` lies along the tangential part of the first of them that has one.
-    pub axes: [Vector3<f64>; 2],
 }
 
 /// What the coordinates of a vertex are.
@@ -71,12 +70,13 @@ struct Known {
     turn: Rotation2<f64>,
 }
 
+/// An anchor, and `w_k R_k` in units of the table.
+type Term = (u32, [[f32; 2]; 2]);
+
 /// The layout around one contact point.
 #[derive(Debug, Clone)]
 pub(crate) struct ChartAt {
-    /// Anchor, and `w_k R_k` in units of the table.
-    terms: [(u32, [[f32; 2]; 2]); BLENDED],
-    n_terms: usize,
+    terms: [Term; BLENDED],
     /// `sum_k w_k R_k q_k(c)`
     offset: [f32; 2],
     /// For the projection: contact point and tangents.
@@ -86,25 +86,26 @@ pub(crate) struct ChartAt {
 }
 
 impl Charts {
-    pub(crate) fn new(skin: &ReferenceSkin, groups: Groups, options: ChartOptions) -> Self {
+    pub(crate) fn new(surface: &Surface, options: ChartOptions) -> Self {
         let reach = options.radius_m + 2.0 * options.anchor_spacing_m;
         let mut this = Self {
             unit: (reach / f64::from(i16::MAX)) as f32,
             rows: Vec::new(),
-            known: vec![Vec::new(); skin.skin().n_vertices()],
-            groups,
+            known: vec![Vec::new(); surface.n_vertices()],
+            groups: surface.groups(),
             options,
         };
         if options.coordinates == Coordinates::Exponential {
-            this.tabulate(skin, reach);
+            this.tabulate(surface, reach);
         }
         this
     }
 
-    fn tabulate(&mut self, skin: &ReferenceSkin, reach: f64) {
+    fn tabulate(&mut self, surface: &Surface, reach: f64) {
+        let skin = surface.reference();
         let maps = ExponentialMaps::new(skin.skin());
         let normals = skin.vertex_normals();
-        let frames = vertex_frames(skin, &self.options.axes);
+        let frames = vertex_frames(skin, surface.axes());
         let neighbours = neighbours(skin);
         let least = self.options.max_normal_angle.cos();
         let n = skin.skin().n_vertices();
@@ -137,12 +138,12 @@ impl Charts {
         }
     }
 
-    /// Around a point of the reference skin with its frame. `None` where no map reaches.
-    pub(crate) fn at(&self, corners: [VertexIdx; 3], point: &SurfacePoint, frame: &ContactFrame) -> Option<ChartAt> {
+    /// Around a point of the reference skin. `None` where no map reaches.
+    pub(crate) fn at(&self, place: &Place) -> Option<ChartAt> {
+        let Place { corners, point, frame } = place;
         let row = |v: &Vector3<f64>| [v.x as f32, v.y as f32, v.z as f32];
         let mut chart = ChartAt {
             terms: [(0, [[0.0; 2]; 2]); BLENDED],
-            n_terms: 0,
             offset: [0.0; 2],
             origin: row(&point.position.coords),
             tangents: [row(&frame.tau), row(&frame.theta)],
@@ -152,10 +153,10 @@ impl Charts {
             return Some(chart);
         }
         let mut found = Nearest::default();
-        for corner in corners {
+        for corner in *corners {
             for known in &self.known[corner.index()] {
                 if !found.holds(known.anchor)
-                    && let Some(known) = self.seen_from(known.anchor, corners, point.weights)
+                    && let Some(known) = self.seen_from(known.anchor, *corners, point.weights)
                 {
                     found.offer(known);
                 }
@@ -164,15 +165,17 @@ impl Charts {
         let end = found.end()?;
         let weight = |k: &Known| (1.0 - k.at.norm() / end).max(1e-6).powi(2);
         let total: f64 = found.blended().map(weight).sum();
-        for known in found.blended() {
+        for (term, known) in chart.terms.iter_mut().zip(found.blended()) {
             let matrix = known.turn.matrix() * (weight(known) / total);
             let shift = matrix * known.at;
             let scaled = |r: usize, c: usize| matrix[(r, c)] as f32 * self.unit;
-            chart.terms[chart.n_terms] = (known.anchor, [[scaled(0, 0), scaled(0, 1)], [scaled(1, 0), scaled(1, 1)]]);
-            chart.n_terms += 1;
+            *term = (known.anchor, [[scaled(0, 0), scaled(0, 1)], [scaled(1, 0), scaled(1, 1)]]);
             chart.offset[0] += shift.x as f32;
             chart.offset[1] += shift.y as f32;
         }
+        // Where fewer are known, the first stands in without weight.
+        let n_known = found.blended().count();
+        (n_known..BLENDED).for_each(|k| chart.terms[k].0 = chart.terms[0].0);
         Some(chart)
     }
 
@@ -189,31 +192,30 @@ impl Charts {
     }
 
     /// Coordinates of all vertices \[m\]; those that are not reached are far away.
-    pub(crate) fn lay_out(&self, chart: &ChartAt, rest: &Planar, normals: &Planar, out: &mut [[F; 2]]) {
+    pub(crate) fn lay_out(&self, chart: &ChartAt, surface: &Surface, out: &mut [[F; 2]]) {
         match self.options.coordinates {
             Coordinates::Exponential => self.blend(chart, out),
-            Coordinates::Orthogonal => self.project(chart, rest, normals, out),
+            Coordinates::Orthogonal => self.project(chart, surface.rest(), surface.normals(), out),
         }
     }
 
     fn blend(&self, chart: &ChartAt, out: &mut [[F; 2]]) {
         let n_groups = self.groups.n();
-        let rows = |anchor: u32| &self.rows[anchor as usize * n_groups..][..n_groups];
-        let unreached = F::splat(f32::from(UNREACHED));
-        out.fill([F::splat(-chart.offset[0]), F::splat(-chart.offset[1])]);
-        for (anchor, m) in &chart.terms[..chart.n_terms] {
-            let m = m.map(|r| r.map(F::splat));
-            for (q, row) in out.iter_mut().zip(rows(*anchor)) {
-                let [x, y] = row.map(|r| F::from_i32x16(i32x16::from_i16x16(r)));
-                let is_far = x.simd_eq(unreached);
-                q[0] = is_far.bitselect(F::splat(FAR), m[0][0].mul_add(x, m[0][1].mul_add(y, q[0])));
-                q[1] = m[1][0].mul_add(x, m[1][1].mul_add(y, q[1]));
+        let row = |(anchor, _): &Term| &self.rows[*anchor as usize * n_groups..][..n_groups];
+        // Fewer than three anchors are few indeed: those that are not there count nothing.
+        let [a, b, c] = &chart.terms;
+        let matrices = [a, b, c].map(|(_, m)| m.map(|r| r.map(F::splat)));
+        let offset = chart.offset.map(|o| F::splat(-o));
+        for (q, ((a, b), c)) in out.iter_mut().zip(row(a).iter().zip(row(b)).zip(row(c))) {
+            let (mut x, mut y, mut nearest) = (offset[0], offset[1], F::splat(f32::INFINITY));
+            for (m, row) in matrices.iter().zip([a, b, c]) {
+                let [u, v] = row.map(|r| F::from_i32x16(i32x16::from_i16x16(r)));
+                x = m[0][0].mul_add(u, m[0][1].mul_add(v, x));
+                y = m[1][0].mul_add(u, m[1][1].mul_add(v, y));
+                nearest = nearest.fast_min(u);
             }
-        }
-        // A far vertex stays far, whatever other maps say.
-        for q in out {
-            let is_far = q[0].abs().simd_gt(F::splat(0.5 * FAR));
-            q[0] = is_far.bitselect(F::splat(FAR), q[0]);
+            let is_far = nearest.simd_eq(F::splat(f32::from(UNREACHED)));
+            *q = [is_far.bitselect(F::splat(FAR), x), y];
         }
     }
 

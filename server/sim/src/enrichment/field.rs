@@ -18,7 +18,7 @@ use wide::f32x4;
 
 use super::fade::smoothstep;
 use super::groups::Groups;
-use super::lattice::Lattice;
+use super::lattice::{Lattice, Pair, put};
 use super::modes::{Modes, Precision, gram};
 use super::rescale::Rescale;
 use super::situation::{Situation, vector};
@@ -76,7 +76,7 @@ pub(crate) struct Field {
 pub(crate) struct FieldScratch {
     coefficients: Vec<f32>,
     planar: Vec<F>,
-    texels: Vec<f32x4>,
+    texels: Vec<Pair>,
 }
 
 impl Field {
@@ -144,7 +144,7 @@ impl Field {
 
     /// `D_i = d_i + B u_c,i`, with the same `B` as at run time.
     fn left_over(&self, situation: &Situation<'_>, detail: &[[f32; 3]]) -> Vec<Vector3<f64>> {
-        let shade: Vec<f32x4> = self.shade.iter().map(|s| f32x4::splat(*s)).collect();
+        let shade = self.paired(&self.shade.iter().map(|s| f32x4::splat(*s)).collect::<Vec<_>>());
         let of_vertex = |(v, d): (usize, &[f32; 3])| {
             let place = self.lattice.locate_one(situation.coordinates(v));
             let b = f64::from(self.far + self.lattice.sample(&shade, place).to_array()[0]);
@@ -160,7 +160,7 @@ impl Field {
             let d = world * d;
             f32x4::new([d.x as f32, d.y as f32, d.z as f32, 0.0])
         };
-        let texels: Vec<f32x4> = stamp.iter().map(texel).collect();
+        let texels = self.paired(&stamp.iter().map(texel).collect::<Vec<_>>());
         let of_vertex = |(v, d): (usize, &Vector3<f64>)| {
             let sampled = self.lattice.sample(&texels, self.lattice.locate_one(situation.coordinates(v)));
             d - vector(&sampled.to_array()).cast::<f64>()
@@ -187,6 +187,12 @@ impl Field {
         stamp
     }
 
+    fn paired(&self, texels: &[f32x4]) -> Vec<Pair> {
+        let mut pairs = vec![[f32x4::ZERO; 2]; self.lattice.n_texels()];
+        texels.iter().enumerate().for_each(|(texel, value)| put(&mut pairs, texel, *value));
+        pairs
+    }
+
     /// Products of the examples' fields, `[n][n]`: what correlators learn to predict.
     pub(crate) fn products(&self) -> &DMatrix<f64> {
         &self.products
@@ -198,7 +204,7 @@ impl Field {
         FieldScratch {
             coefficients: vec![0.0; rank(&self.stamps).max(rank(&self.vectors))],
             planar: vec![F::ZERO; 3 * n_groups],
-            texels: vec![f32x4::ZERO; self.lattice.n_texels()],
+            texels: self.paired(&[]),
         }
     }
 
@@ -240,23 +246,24 @@ impl Field {
         situation: &Situation<'_>,
         weights: &[f32],
         (coefficients, planar): (&mut [f32], &mut [F]),
-        texels: &mut [f32x4],
+        texels: &mut [Pair],
     ) {
         let n = self.texel_groups.n();
         let Some(stamps) = &self.stamps else {
-            texels.iter_mut().zip(&self.shade).for_each(|(t, shade)| *t = f32x4::new([0.0, 0.0, 0.0, *shade]));
+            let shade = self.shade.iter().enumerate();
+            shade.for_each(|(texel, shade)| put(texels, texel, f32x4::new([0.0, 0.0, 0.0, *shade])));
             return;
         };
         stamps.blend(weights, coefficients, planar);
         let m = situation.frame.map(F::splat);
-        for (g, (texels, shade)) in texels.chunks_mut(LANES).zip(self.shade.chunks(LANES)).enumerate() {
+        for (g, shade) in self.shade.chunks(LANES).enumerate() {
             let local = [planar[g], planar[n + g], planar[2 * n + g]];
             let world: [[f32; LANES]; 3] = std::array::from_fn(|k| {
                 let sum = local[0] * m[(0, k)];
                 local[2].mul_add(m[(2, k)], local[1].mul_add(m[(1, k)], sum)).to_array()
             });
-            for (lane, (texel, shade)) in texels.iter_mut().zip(shade).enumerate() {
-                *texel = f32x4::new([world[0][lane], world[1][lane], world[2][lane], *shade]);
+            for (lane, shade) in shade.iter().enumerate() {
+                put(texels, g * LANES + lane, f32x4::new([world[0][lane], world[1][lane], world[2][lane], *shade]));
             }
         }
     }

@@ -5,9 +5,9 @@
 
 use nalgebra::Vector2;
 use plica_geometry::Skin;
-use wide::f32x4;
+use wide::{f32x4, f32x8};
 
-use crate::lanes::F;
+use crate::lanes::{F, LANES};
 
 /// `b`
 const STRETCH: f64 = 2.0;
@@ -19,6 +19,18 @@ const LARGEST_STRETCH: f64 = 3.0;
 pub(crate) struct Lattice {
     radius: f64,
     n: usize,
+}
+
+/// A texel beside the next one of its row, as [`Lattice::sample`] reads them.
+pub(crate) type Pair = [f32x4; 2];
+
+/// Puts a texel where samples read it.
+#[inline(always)]
+pub(crate) fn put(pairs: &mut [Pair], texel: usize, value: f32x4) {
+    pairs[texel][0] = value;
+    if texel > 0 {
+        pairs[texel - 1][1] = value;
+    }
 }
 
 /// One texel covered by a triangle.
@@ -56,7 +68,7 @@ impl Lattice {
 
     /// The lower texel and the shares of the upper ones, for sixteen points; what lies outside has a negative texel.
     #[inline(always)]
-    pub(crate) fn locate(&self, q: &[F; 2]) -> ([i32; 16], [f32; 16], [f32; 16]) {
+    pub(crate) fn locate(&self, q: &[F; 2]) -> ([i32; LANES], [f32; LANES], [f32; LANES]) {
         let (last, radius) = ((self.n - 1) as f32, F::splat(self.radius as f32));
         let stretch = F::splat(STRETCH as f32);
         let place = |x: F| {
@@ -69,8 +81,7 @@ impl Lattice {
         let cell = |x: F| x.fast_max(F::ZERO).fast_min(F::splat(last - 1.0)).floor();
         let (i, j) = (cell(x), cell(y));
         let texel = inside.bitselect(i.mul_add(F::splat(self.n as f32), j), F::splat(-1.0));
-        let index = texel.to_array().map(|t| t as i32);
-        (index, (x - i).to_array(), (y - j).to_array())
+        (texel.fast_trunc_int().to_array(), (x - i).to_array(), (y - j).to_array())
     }
 
     /// The same for one point.
@@ -81,16 +92,13 @@ impl Lattice {
 
     /// Bilinear between the four texels of a cell; zero outside.
     #[inline(always)]
-    pub(crate) fn sample(&self, texels: &[f32x4], (texel, x, y): (i32, f32, f32)) -> f32x4 {
+    pub(crate) fn sample(&self, pairs: &[Pair], (texel, x, y): (i32, f32, f32)) -> f32x4 {
         if texel < 0 {
             return f32x4::ZERO;
         }
-        let (texel, n) = (texel as usize, self.n);
-        let (lower, upper) = (&texels[texel..texel + 2], &texels[texel + n..texel + n + 2]);
-        let (x, y) = (f32x4::splat(x), f32x4::splat(y));
-        let low = (lower[1] - lower[0]).mul_add(y, lower[0]);
-        let high = (upper[1] - upper[0]).mul_add(y, upper[0]);
-        (high - low).mul_add(x, low)
+        let [lower, upper]: [f32x8; 2] = [texel as usize, texel as usize + self.n].map(|t| bytemuck::cast(pairs[t]));
+        let [first, second]: [f32x4; 2] = bytemuck::cast((upper - lower).mul_add(f32x8::splat(x), lower));
+        (second - first).mul_add(f32x4::splat(y), first)
     }
 
     /// Texels that triangles cover, once a skin is laid out; `None` is what is not reached.

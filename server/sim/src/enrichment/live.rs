@@ -6,7 +6,9 @@
 
 use std::sync::Arc;
 
-use super::clearance::{keep_clear, position};
+use wide::f32x4;
+
+use super::clearance::keep_clear;
 use super::enricher::{Enricher, EnricherScratch};
 use super::situation::{Touch, vector};
 use crate::lanes::Node;
@@ -59,7 +61,7 @@ pub struct LiveEnrichment {
     enricher: Arc<Enricher>,
     scratch: EnricherScratch,
     tools: Vec<ToolWindows>,
-    rest: Vec<[f32; 3]>,
+    rest: Vec<Node>,
     offsets: Vec<Node>,
     detail: Vec<Node>,
     /// Shares of the windows at each vertex: sum and largest.
@@ -71,7 +73,7 @@ impl LiveEnrichment {
     /// Nothing touched yet.
     pub fn new(model: &Model, enricher: Arc<Enricher>) -> Self {
         let n_skin = model.n_skin();
-        let rest = model.description().skin.positions().iter().map(|p| [p.x as f32, p.y as f32, p.z as f32]);
+        let rest = model.description().skin.positions().iter().map(|p| [p.x as f32, p.y as f32, p.z as f32, 0.0]);
         Self {
             scratch: enricher.scratch(),
             tools: vec![ToolWindows::default(); model.n_tools()],
@@ -133,12 +135,17 @@ impl LiveEnrichment {
             1 => self.lay_one(model, state),
             _ => self.lay_all(model, state),
         }
+        let mut largest = f32x4::ZERO;
         for (((out, rest), offset), detail) in out.iter_mut().zip(&self.rest).zip(&self.offsets).zip(&self.total) {
-            *out = std::array::from_fn(|k| rest[k] + offset[k] + detail[k]);
+            let detail = f32x4::from(*detail);
+            let [x, y, z, _] = (f32x4::from(*rest) + f32x4::from(*offset) + detail).to_array();
+            *out = [x, y, z];
+            largest = largest.fast_max(detail.abs());
         }
-        for (reading, solid) in state.tools().iter().zip(&model.solids).filter(|(r, _)| r.present) {
-            let coarse = |v: usize| position(&self.rest[v], &self.offsets[v]);
-            keep_clear(solid, &placement(&reading.proxy), coarse, out);
+        let reach = vector(&largest.to_array()).norm();
+        for (reading, solid) in state.tools().iter().zip(&model.solids).filter(|(r, _)| r.present && reach > 0.0) {
+            let coarse = |v: usize| vector(&self.rest[v]) + vector(&self.offsets[v]);
+            keep_clear(solid, &placement(&reading.proxy), (state.skin.boxes(), reach), coarse, out);
         }
     }
 
@@ -247,7 +254,6 @@ impl ToolWindows {
 }
 
 /// How far a vertex is from where it rests \[m\].
-fn offset(state: &State, rest: &[[f32; 3]], vertex: usize) -> f32 {
-    let [deformed, rest] = [state.skin.vertex(vertex), rest[vertex]];
-    vector(&[deformed[0] - rest[0], deformed[1] - rest[1], deformed[2] - rest[2], 0.0]).norm()
+fn offset(state: &State, rest: &[Node], vertex: usize) -> f32 {
+    (crate::contact::V3::from(state.skin.vertex(vertex)) - vector(&rest[vertex])).norm()
 }

@@ -6,7 +6,9 @@
 
 mod charts;
 mod clearance;
+mod correlation;
 mod enricher;
+mod examples;
 mod fade;
 mod field;
 mod groups;
@@ -15,19 +17,23 @@ mod lattice;
 mod linear;
 mod live;
 mod modes;
+mod options;
 mod rbf;
 mod rescale;
 mod situation;
 mod ssh12;
 mod stencil;
+mod surface;
 mod warp;
 
-pub use charts::{ChartOptions, Coordinates};
-pub use enricher::{Correlator, Enricher, EnricherError, EnricherScratch, EnrichmentOptions, Examples};
+pub use charts::Coordinates;
+pub use enricher::{Enricher, EnricherError, EnricherScratch};
+pub use examples::Examples;
 pub use field::{FieldOptions, Interpolator};
 pub use kriging::KrigingChoice;
 pub use linear::LinearKind;
 pub use live::LiveEnrichment;
 pub use modes::Precision;
+pub use options::{Correlator, EnrichmentOptions};
 pub use situation::Touch;
 pub use ssh12::Ssh12Options;

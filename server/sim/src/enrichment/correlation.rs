@@ -1,0 +1,82 @@
+//! Which way of comparing states is used.
+
+use nalgebra::DMatrix;
+use plica_geometry::ReferenceSkin;
+
+use super::enricher::EnricherError;
+use super::kriging::{Kriging, KrigingChoice};
+use super::linear::Linear;
+use super::options::Correlator;
+use super::rbf::Rbf;
+use super::situation::Situation;
+use super::ssh12::Ssh12;
+use super::stencil::Stencil;
+use crate::model::Model;
+
+/// Pitch and width of the stencil, in coarse cells.
+const STENCIL_CELLS: [f64; 2] = [2.0 / 3.0, 1.0];
+
+/// A correlator with its tables.
+#[derive(Debug, Clone)]
+pub(crate) enum Correlation {
+    None,
+    Ssh12(Ssh12),
+    Linear(Linear),
+    Rbf(Rbf),
+    Kriging(Box<Kriging>, KrigingChoice),
+}
+
+impl Correlation {
+    /// `products` are those of what is to be predicted, `[n][n]`.
+    pub(crate) fn new(
+        model: &Model,
+        skin: &ReferenceSkin,
+        correlator: Correlator,
+        situations: &[Situation<'_>],
+        products: &DMatrix<f64>,
+    ) -> Result<Self, EnricherError> {
+        let singular = || EnricherError::Singular;
+        let cell = f64::from(model.cell_size);
+        Ok(match correlator {
+            Correlator::Rescale => Self::None,
+            Correlator::Ssh12(options) => Self::Ssh12(Ssh12::new(situations, options)),
+            Correlator::Linear(kind) => {
+                let mesh = (&model.description().mesh, &model.order);
+                Self::Linear(Linear::new(kind, situations, products, mesh).ok_or_else(singular)?)
+            }
+            Correlator::Rbf { width_cells } => {
+                Self::Rbf(Rbf::new(situations, width_cells * cell).ok_or_else(singular)?)
+            }
+            Correlator::Kriging => {
+                let [pitch, width] = STENCIL_CELLS.map(|cells| cells * cell);
+                let stencil = Stencil::new(skin, pitch, width);
+                let (kriging, choice) = Kriging::new(stencil, situations, products, cell).ok_or_else(singular)?;
+                Self::Kriging(Box::new(kriging), choice)
+            }
+        })
+    }
+
+    /// Writes the weights `[n]` and returns the confidence.
+    pub(crate) fn weigh(&self, situation: &Situation<'_>, kernel: &mut [f32], weights: &mut [f32]) -> f32 {
+        match self {
+            Self::None => 1.0,
+            Self::Ssh12(ssh12) => ssh12.weigh(situation, weights),
+            Self::Linear(linear) => linear.weigh(situation, weights),
+            Self::Rbf(rbf) => rbf.weigh(situation, kernel, weights),
+            Self::Kriging(kriging, _) => kriging.weigh(situation, kernel, weights),
+        }
+    }
+
+    /// Whether its confidence says how far the detail is to be trusted; the paper's weights fade by themselves, others know no
+    /// doubt.
+    pub(crate) fn doubts(&self) -> bool {
+        matches!(self, Self::Kriging(..))
+    }
+
+    pub(crate) fn kriging_choice(&self) -> Option<KrigingChoice> {
+        match self {
+            Self::Kriging(_, choice) => Some(*choice),
+            _ => None,
+        }
+    }
+}
