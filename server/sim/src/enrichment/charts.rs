@@ -321,3 +321,79 @@ fn turn(
     }
     Some(Rotation2::new(sin.atan2(cos)))
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+    use nalgebra::Point3;
+    use plica_geometry::shapes::{Wedge, wedge_skin};
+
+    use super::super::situation::coordinates;
+    use super::*;
+
+    fn wedge() -> Surface {
+        Surface::new(&wedge_skin(&Wedge::default(), 3e-3), [Vector3::x(), Vector3::y()])
+    }
+
+    fn options(coordinates: Coordinates) -> ChartOptions {
+        ChartOptions { radius_m: 0.05, anchor_spacing_m: 0.005, max_normal_angle: 2.2, coordinates }
+    }
+
+    fn laid_out(surface: &Surface, charts: &Charts, contact: [f64; 2]) -> Vec<[f32; 2]> {
+        let contact = Point3::new(contact[0], contact[1], Wedge::default().height_m(contact[0]));
+        let mut layout = vec![[F::ZERO; 2]; surface.groups().n()];
+        charts.lay_out(&charts.at(&surface.place(&contact)).unwrap(), surface, &mut layout);
+        (0..surface.n_vertices()).map(|v| coordinates(&layout, v)).collect()
+    }
+
+    #[test]
+    fn on_the_flat_top_coordinates_are_offsets_from_the_contact_point() {
+        let surface = wedge();
+        let slope = (1.0_f64 + 0.0625).sqrt();
+        for kind in [Coordinates::Exponential, Coordinates::Orthogonal] {
+            let charts = Charts::new(&surface, options(kind));
+            for contact in [[0.05, 0.03], [0.0511, 0.0293], [0.0437, 0.0352]] {
+                let mut n = 0;
+                for (p, q) in surface.reference().skin().positions().iter().zip(laid_out(&surface, &charts, contact)) {
+                    let is_top = (p.z - Wedge::default().height_m(p.x)).abs() < 1e-9;
+                    let expected = [(p.x - contact[0]) * slope, p.y - contact[1]];
+                    if is_top && expected[0].hypot(expected[1]) < 0.045 {
+                        let error = (f64::from(q[0]) - expected[0]).hypot(f64::from(q[1]) - expected[1]);
+                        assert!(error < 2e-5, "{kind:?} {contact:?}: {p} at {q:?}, not {expected:?}");
+                        n += 1;
+                    }
+                }
+                assert!(n > 200, "{n}");
+            }
+        }
+    }
+
+    #[test]
+    fn behind_a_rim_the_map_goes_on_and_the_projection_ends() {
+        let surface = wedge();
+        let reached = |kind| {
+            let charts = Charts::new(&surface, options(kind));
+            let positions = surface.reference().skin().positions();
+            let layout = laid_out(&surface, &charts, [0.05, 0.01]);
+            let on_side = |p: &Point3<f64>| p.y < 1e-9 && p.z > 0.005 && p.z < Wedge::default().height_m(p.x) - 1e-3;
+            let side = positions.iter().zip(layout).filter(|(p, q)| on_side(p) && q[0].hypot(q[1]) < 0.05);
+            side.map(|(p, q)| (0.01 + Wedge::default().height_m(p.x) - p.z - f64::from(-q[1])).abs())
+                .collect::<Vec<_>>()
+        };
+        let geodesic = reached(Coordinates::Exponential);
+        // The rim is slanted and the side is not: unfolding turns the side by up to the slope.
+        assert!(geodesic.len() > 20 && geodesic.iter().all(|error| *error < 8e-3), "{geodesic:?}");
+        let projected = reached(Coordinates::Orthogonal);
+        assert!(projected.iter().all(|error| *error > 1e-3), "projected onto the rim");
+    }
+
+    #[test]
+    fn what_no_map_reaches_is_far() {
+        let surface = wedge();
+        let charts = Charts::new(&surface, options(Coordinates::Exponential));
+        let layout = laid_out(&surface, &charts, [0.05, 0.03]);
+        let bottom = surface.reference().skin().positions().iter().zip(layout).filter(|(p, _)| p.z < 1e-9);
+        assert!(bottom.clone().filter(|(p, _)| p.y > 0.01 && p.y < 0.05).all(|(_, q)| q[0] == FAR));
+    }
+}

@@ -144,3 +144,57 @@ pub(crate) fn is_torn(skin: &Skin, corners: [usize; 3], at: [Vector2<f64>; 3]) -
         (at[i] - at[j]).norm() > LARGEST_STRETCH * here
     })
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+    use plica_geometry::shapes::{Wedge, wedge_skin};
+
+    use super::*;
+
+    #[test]
+    fn texels_lie_where_they_are_found() {
+        let lattice = Lattice::new(0.08, 32);
+        for texel in [0, 5, 33, 500, 32 * 31 - 2] {
+            let q = lattice.position(texel);
+            let (found, x, y) = lattice.locate_one([q.x as f32, q.y as f32]);
+            let (row, column) = (found as f32 / 32.0, found as f32 % 32.0);
+            assert!((row.floor() + x - (texel / 32) as f32).abs() < 1e-3, "{texel}: {found} {x}");
+            assert!((column + y - (texel % 32) as f32).abs() < 1e-3, "{texel}: {found} {y}");
+        }
+        assert!(lattice.locate_one([0.081, 0.0]).0 < 0 && lattice.locate_one([0.0, -1e6]).0 < 0);
+        let [middle, rim] = [16, 31].map(|i| lattice.position(32 * i).x - lattice.position(32 * (i - 1)).x);
+        assert!(rim > 4.0 * middle, "{middle} {rim}");
+    }
+
+    #[test]
+    fn samples_are_texels_and_between_them_means() {
+        let lattice = Lattice::new(1.0, 8);
+        let mut pairs = vec![[f32x4::ZERO; 2]; 64];
+        let value = |texel: usize| (texel / 8) as f32 * 10.0 + (texel % 8) as f32;
+        (0..64).for_each(|texel| put(&mut pairs, texel, f32x4::splat(value(texel))));
+        assert_eq!(lattice.sample(&pairs, (19, 0.0, 0.0)).to_array(), [value(19); 4]);
+        assert_eq!(lattice.sample(&pairs, (19, 0.5, 0.25)).to_array(), [value(19) + 5.25; 4]);
+        assert_eq!(lattice.sample(&pairs, (-1, 0.5, 0.25)).to_array(), [0.0; 4]);
+    }
+
+    #[test]
+    fn a_skin_that_is_laid_out_covers_the_texels_under_it() {
+        let skin = wedge_skin(&Wedge::default(), 4e-3);
+        let is_top = |v: usize| (skin.positions()[v].z - Wedge::default().height_m(skin.positions()[v].x)).abs() < 1e-9;
+        let at = |v: usize| is_top(v).then(|| Vector2::new(skin.positions()[v].x - 0.06, skin.positions()[v].y - 0.03));
+        let at: Vec<_> = (0..skin.n_vertices()).map(at).collect();
+        let lattice = Lattice::new(0.05, 24);
+        let covered = lattice.cover(&skin, &at);
+        for texel in 0..lattice.n_texels() {
+            let q = lattice.position(texel);
+            let found = covered.iter().find(|c| c.texel == texel);
+            assert_eq!(found.is_some(), q.y.abs() <= 0.03, "{q}");
+            if let Some(found) = found {
+                let x: f64 = found.corners.iter().zip(found.weights).map(|(v, w)| at[*v].unwrap().x * w).sum();
+                assert!((x - q.x).abs() < 5e-4, "{x} and not {}", q.x);
+            }
+        }
+    }
+}

@@ -146,3 +146,49 @@ fn combine(fields: &[Vec<f64>], weights: &DVector<f64>) -> Vec<f64> {
     }
     sum
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Thirty fields that are sums of four patterns, the later ones weaker.
+    fn fields() -> Vec<Vec<f64>> {
+        let pattern = |m: usize, j: usize| ((m + 1) as f64 * 0.37 * j as f64).sin() / (1 << m) as f64;
+        let share = |i: usize, m: usize| (1.3 * (i * (m + 2)) as f64).cos();
+        let value = |i: usize, j: usize| (0..4).map(|m| share(i, m) * pattern(m, j)).sum();
+        (0..30).map(|i| (0..100).map(|j| value(i, j)).collect()).collect()
+    }
+
+    /// Largest error over all fields, as a share of the largest value.
+    fn error(n_modes: usize, precision: Precision) -> f64 {
+        let fields = fields();
+        let modes = Modes::new(&fields, &gram(&fields), n_modes, precision);
+        let (mut scratch, mut out) = (vec![0.0; modes.rank()], vec![F::ZERO; 7]);
+        let mut worst: f64 = 0.0;
+        for (i, field) in fields.iter().enumerate() {
+            let mut weights = vec![0.0; 30];
+            weights[i] = 1.0;
+            modes.blend(&weights, &mut scratch, &mut out);
+            let blended = bytemuck::cast_slice::<F, f32>(&out);
+            worst = field.iter().zip(blended).map(|(a, b)| (a - f64::from(*b)).abs()).fold(worst, f64::max);
+        }
+        worst / fields.iter().flatten().fold(0.0_f64, |m, v| m.max(v.abs()))
+    }
+
+    #[test]
+    fn as_many_modes_as_patterns_lose_nothing() {
+        assert!(error(30, Precision::F32) < 1e-6);
+        assert!(error(4, Precision::F32) < 1e-5);
+        assert!(error(4, Precision::I16) < 1e-4);
+        let [three, two] = [error(3, Precision::F32), error(2, Precision::F32)];
+        assert!(three > 1e-3 && two > three && two < 0.5, "{three} {two}");
+    }
+
+    #[test]
+    fn all_numbers_of_modes_blend_alike() {
+        // Modes are summed four at a time; what is left over must not be lost.
+        for n_modes in [5, 6, 7, 9] {
+            assert!(error(n_modes, Precision::F32) < 1e-5, "{n_modes}");
+        }
+    }
+}
