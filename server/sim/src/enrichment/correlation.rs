@@ -45,7 +45,7 @@ impl Correlation {
                 Self::Linear(Linear::new(kind, situations, products, mesh).ok_or_else(singular)?)
             }
             Correlator::Rbf { width_cells } => {
-                Self::Rbf(Rbf::new(situations, width_cells * cell).ok_or_else(singular)?)
+                Self::Rbf(Rbf::new(situations, products, width_cells * cell).ok_or_else(singular)?)
             }
             Correlator::Kriging => {
                 let [pitch, width] = STENCIL_CELLS.map(|cells| cells * cell);

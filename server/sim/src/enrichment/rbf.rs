@@ -3,10 +3,11 @@
 
 use nalgebra::{DMatrix, Vector3};
 
+use super::kriging::leave_one_out;
 use super::situation::Situation;
 
-/// Share of the diagonal that keeps the matrix regular.
-const NUGGET: f64 = 1e-6;
+/// Candidates for what is added to the diagonal, by leave-one-out error.
+const NUGGETS: [f64; 4] = [1e-4, 1e-3, 1e-2, 1e-1];
 
 /// Weights by the position of the tool.
 #[derive(Debug, Clone)]
@@ -18,13 +19,16 @@ pub(crate) struct Rbf {
 }
 
 impl Rbf {
-    /// With the width `l` \[m\].
-    pub(crate) fn new(situations: &[Situation<'_>], width: f64) -> Option<Self> {
+    /// With the width `l` \[m\]; `products` are those of what is to be predicted, `[n][n]`.
+    pub(crate) fn new(situations: &[Situation<'_>], products: &DMatrix<f64>, width: f64) -> Option<Self> {
         let positions: Vec<_> = situations.iter().map(|s| s.tool_origin).collect();
         let n = positions.len();
         let kernel = |i: usize, j: usize| f64::from(between(&positions[i], &positions[j], width as f32));
-        let matrix = DMatrix::from_fn(n, n, kernel) + DMatrix::identity(n, n) * NUGGET;
-        let inverse = matrix.cholesky()?.inverse().transpose().iter().map(|v| *v as f32).collect();
+        let matrix = DMatrix::from_fn(n, n, kernel);
+        let inverse = |nugget: &f64| Some((&matrix + DMatrix::identity(n, n) * *nugget).cholesky()?.inverse());
+        let error = |inverse: &DMatrix<f64>| leave_one_out(inverse, products);
+        let best = NUGGETS.iter().filter_map(inverse).min_by(|a, b| error(a).total_cmp(&error(b)))?;
+        let inverse = best.transpose().iter().map(|v| *v as f32).collect();
         Some(Self { positions, width: width as f32, inverse })
     }
 
