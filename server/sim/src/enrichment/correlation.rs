@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 use plica_geometry::ReferenceSkin;
 
 use super::enricher::EnricherError;
+use super::fade::Trust;
 use super::kriging::{Kriging, KrigingChoice};
 use super::linear::Linear;
 use super::options::Correlator;
@@ -56,21 +57,15 @@ impl Correlation {
         })
     }
 
-    /// Writes the weights `[n]` and returns the confidence.
-    pub(crate) fn weigh(&self, situation: &Situation<'_>, kernel: &mut [f32], weights: &mut [f32]) -> f32 {
+    /// Writes the weights `[n]`.
+    pub(crate) fn weigh(&self, situation: &Situation<'_>, kernel: &mut [f32], weights: &mut [f32]) -> Trust {
         match self {
-            Self::None => 1.0,
+            Self::None => Trust::FULL,
             Self::Ssh12(ssh12) => ssh12.weigh(situation, weights),
             Self::Linear(linear) => linear.weigh(situation, weights),
             Self::Rbf(rbf) => rbf.weigh(situation, kernel, weights),
             Self::Kriging(kriging, _) => kriging.weigh(situation, kernel, weights),
         }
-    }
-
-    /// Whether its confidence says how far the detail is to be trusted; the paper's weights fade by themselves, others know no
-    /// doubt.
-    pub(crate) fn doubts(&self) -> bool {
-        matches!(self, Self::Kriging(..))
     }
 
     pub(crate) fn kriging_choice(&self) -> Option<KrigingChoice> {

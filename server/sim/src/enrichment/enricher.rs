@@ -5,6 +5,7 @@ use nalgebra::Matrix3;
 use super::charts::{ChartOptions, Charts};
 use super::correlation::Correlation;
 use super::examples::{Examples, SeenExamples, check, without_duplicates};
+use super::fade::Trust;
 use super::field::{Field, FieldScratch};
 use super::kriging::KrigingChoice;
 use super::options::{Correlator, EnrichmentOptions};
@@ -149,10 +150,10 @@ impl Enricher {
         scratch: &mut EnricherScratch,
         detail: &mut [Node],
     ) -> f32 {
-        self.evaluate_within([0.0, 1.0], &state.u[..model.n_free], offsets, touch, scratch, detail)
+        self.evaluate_within([0.0, 1.0], &state.u[..model.n_free], offsets, touch, scratch, detail).confidence
     }
 
-    /// The same with bounds for the confidence.
+    /// The same with bounds for the share that is laid on the skin.
     pub(crate) fn evaluate_within(
         &self,
         [least, most]: [f32; 2],
@@ -161,17 +162,17 @@ impl Enricher {
         touch: &Touch,
         scratch: &mut EnricherScratch,
         detail: &mut [Node],
-    ) -> f32 {
+    ) -> Trust {
         let EnricherScratch { layout, weights, kernel, field } = scratch;
         let Some(place) = self.lay_out(touch, layout) else {
             detail.fill([0.0; 4]);
-            return 0.0;
+            return Trust::NONE;
         };
         let situation = situation(displacements, offsets, layout, &place, touch);
-        let confidence = self.correlation.weigh(&situation, kernel, weights).clamp(least, most);
-        let fades = self.options.fade && self.correlation.doubts();
-        self.field.evaluate(&situation, weights, if fades { confidence } else { 1.0 }, field, detail);
-        confidence
+        let mut trust = self.correlation.weigh(&situation, kernel, weights);
+        trust.share = if self.options.fade { trust.share.clamp(least, most) } else { 1.0 };
+        self.field.evaluate(&situation, weights, trust.share, field, detail);
+        trust
     }
 
     /// Detail with given weights `[n]`, in place of the correlator's: to see what interpolation alone does.

@@ -1,5 +1,21 @@
 //! From how new a state is to how much its detail is trusted.
 
+/// What a correlator thinks of its weights.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Trust {
+    /// How much of the detail is laid on the skin: between 0 and 1.
+    pub(crate) share: f32,
+    /// What is published: between 0, the plain coarse skin, and 1, a state as in the examples.
+    pub(crate) confidence: f32,
+}
+
+impl Trust {
+    /// Knows no doubt.
+    pub(crate) const FULL: Self = Self { share: 1.0, confidence: 1.0 };
+    /// Nothing to lay on the skin.
+    pub(crate) const NONE: Self = Self { share: 0.0, confidence: 0.0 };
+}
+
 /// Smooth fall from 1 to 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Fade {
@@ -8,7 +24,7 @@ pub(crate) struct Fade {
 }
 
 impl Fade {
-    /// Full confidence up to twice what the newest example would have been to the others, none half-way from there to a state
+    /// All of the detail up to twice what the newest example would have been to the others, none half-way from there to a state
     /// that no example tells anything about.
     pub(crate) fn after(novelties: &[f64]) -> Self {
         let newest = novelties.iter().copied().fold(0.0, f64::max);
@@ -16,9 +32,10 @@ impl Fade {
         Self { begin: begin as f32, end: (0.5 * (begin + 1.0)) as f32 }
     }
 
-    /// Between 0 and 1.
-    pub(crate) fn confidence(&self, novelty: f32) -> f32 {
-        1.0 - smoothstep((novelty - self.begin) / (self.end - self.begin))
+    /// The share fades; the confidence tells trusted states apart as well.
+    pub(crate) fn trust(&self, novelty: f32) -> Trust {
+        let share = 1.0 - smoothstep((novelty - self.begin) / (self.end - self.begin));
+        Trust { share, confidence: share * (1.0 - novelty).clamp(0.0, 1.0) }
     }
 }
 

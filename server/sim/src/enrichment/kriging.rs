@@ -8,7 +8,7 @@
 
 use nalgebra::{DMatrix, Vector3};
 
-use super::fade::Fade;
+use super::fade::{Fade, Trust};
 use super::situation::Situation;
 use super::stencil::{N_FEATURES, Stencil};
 
@@ -90,20 +90,20 @@ impl Kriging {
         Some((Self { stencil, points, kernel: fitted.kernel, inverse, fade }, choice))
     }
 
-    /// Writes `w` and returns the confidence; `scratch` holds at least `n` numbers.
-    pub(crate) fn weigh(&self, situation: &Situation<'_>, scratch: &mut [f32], weights: &mut [f32]) -> f32 {
+    /// Writes `w`; `scratch` holds at least `n` numbers.
+    pub(crate) fn weigh(&self, situation: &Situation<'_>, scratch: &mut [f32], weights: &mut [f32]) -> Trust {
         let n = self.points.len();
         let point = Point::new(&self.stencil, situation);
         let (k, own) = (&mut scratch[..n], self.kernel.between(&point, &point));
         if own <= f32::MIN_POSITIVE {
             weights.fill(0.0);
-            return 0.0;
+            return Trust::NONE;
         }
         k.iter_mut().zip(&self.points).for_each(|(k, p)| *k = self.kernel.between(&point, p));
         for (w, row) in weights.iter_mut().zip(self.inverse.chunks_exact(n)) {
             *w = dot(row, k);
         }
-        self.fade.confidence(1.0 - dot(&weights[..n], k) / own)
+        self.fade.trust(1.0 - dot(&weights[..n], k) / own)
     }
 }
 

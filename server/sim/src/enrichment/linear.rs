@@ -7,6 +7,7 @@
 use nalgebra::DMatrix;
 use plica_geometry::HexMesh;
 
+use super::fade::Trust;
 use super::kriging::leave_one_out;
 use super::situation::Situation;
 use super::ssh12::product;
@@ -73,12 +74,12 @@ impl Linear {
     }
 
     /// Writes `w`; knows no doubt.
-    pub(crate) fn weigh(&self, situation: &Situation<'_>, weights: &mut [f32]) -> f32 {
+    pub(crate) fn weigh(&self, situation: &Situation<'_>, weights: &mut [f32]) -> Trust {
         let u = situation.displacements;
         for (w, row) in weights.iter_mut().zip(self.rows.chunks_exact(u.len())) {
             *w = product(row, u);
         }
-        1.0
+        Trust::FULL
     }
 }
 

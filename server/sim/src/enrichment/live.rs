@@ -10,13 +10,14 @@ use wide::f32x4;
 
 use super::clearance::keep_clear;
 use super::enricher::{Enricher, EnricherScratch};
+use super::fade::Trust;
 use super::situation::{Touch, vector};
 use crate::lanes::Node;
 use crate::model::Model;
 use crate::state::State;
 use crate::step::placement;
 
-/// Time in which one window of a tool takes over from another, and confidence may rise from 0 to 1 \[s\].
+/// Time in which one window of a tool takes over from another, and detail may come or go as trust does \[s\].
 const HAND_OVER_S: f32 = 0.05;
 /// A contact point that moves farther than this in a tick is another contact, in coarse cells.
 const JUMP_CELLS: f64 = 0.25;
@@ -33,8 +34,8 @@ struct Window {
     touch: Touch,
     /// Between 0 and 1: how far it has taken over.
     gain: f32,
-    /// Confidence when it was last laid on the skin, and the tick.
-    laid: Option<(f32, u64)>,
+    /// How far it was trusted when it was last laid on the skin, and the tick.
+    laid: Option<(Trust, u64)>,
     released: Option<Released>,
 }
 
@@ -156,11 +157,11 @@ impl LiveEnrichment {
     /// Evaluates the window in a slot into `detail`; its gain.
     fn lay(&mut self, slot: usize, model: &Model, state: &State, detail: &mut [Node]) -> f32 {
         let Some(window) = self.tools[slot / 2].slot_mut(slot) else { return 0.0 };
-        let bounds = window.confidence_bounds(state.tick(), model.timestep_s() as f32 / HAND_OVER_S);
+        let bounds = window.share_bounds(state.tick(), model.timestep_s() as f32 / HAND_OVER_S);
         let displacements = &state.u[..model.n_free];
         let (touch, offsets, scratch) = (&window.touch, &self.offsets, &mut self.scratch);
-        let confidence = self.enricher.evaluate_within(bounds, displacements, offsets, touch, scratch, detail);
-        window.laid = Some((confidence, state.tick()));
+        let trust = self.enricher.evaluate_within(bounds, displacements, offsets, touch, scratch, detail);
+        window.laid = Some((trust, state.tick()));
         window.gain
     }
 
@@ -204,11 +205,11 @@ impl Window {
         Self { touch, gain, laid: None, released: None }
     }
 
-    /// Confidence may move by `step` a tick, so that detail does not pop; at first it is what it is, as there is no detail yet.
-    fn confidence_bounds(&self, tick: u64, step: f32) -> [f32; 2] {
-        self.laid.map_or([0.0, 1.0], |(confidence, before)| {
+    /// The share on the skin may move by `step` a tick, so that detail does not pop; at first it is what it is, as there is no detail yet.
+    fn share_bounds(&self, tick: u64, step: f32) -> [f32; 2] {
+        self.laid.map_or([0.0, 1.0], |(trust, before)| {
             let most = step * tick.saturating_sub(before) as f32;
-            [(confidence - most).max(0.0), (confidence + most).min(1.0)]
+            [(trust.share - most).max(0.0), (trust.share + most).min(1.0)]
         })
     }
 }
@@ -224,7 +225,7 @@ impl ToolWindows {
     }
 
     fn confidence(&self) -> f32 {
-        self.current.and_then(|w| w.laid).map_or(0.0, |(confidence, _)| confidence)
+        self.current.and_then(|w| w.laid).map_or(0.0, |(trust, _)| trust.confidence)
     }
 
     fn touch(&mut self, touch: Touch, jump: f64) {

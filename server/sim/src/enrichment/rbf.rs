@@ -3,6 +3,7 @@
 
 use nalgebra::{DMatrix, Vector3};
 
+use super::fade::Trust;
 use super::kriging::leave_one_out;
 use super::situation::Situation;
 
@@ -33,14 +34,14 @@ impl Rbf {
     }
 
     /// Writes `w`, without a doubt; `scratch` holds at least `n` numbers.
-    pub(crate) fn weigh(&self, situation: &Situation<'_>, scratch: &mut [f32], weights: &mut [f32]) -> f32 {
+    pub(crate) fn weigh(&self, situation: &Situation<'_>, scratch: &mut [f32], weights: &mut [f32]) -> Trust {
         let n = self.positions.len();
         let k = &mut scratch[..n];
         k.iter_mut().zip(&self.positions).for_each(|(k, p)| *k = between(&situation.tool_origin, p, self.width));
         for (w, row) in weights.iter_mut().zip(self.inverse.chunks_exact(n)) {
             *w = row.iter().zip(&*k).map(|(a, b)| a * b).sum();
         }
-        1.0
+        Trust::FULL
     }
 }
 

@@ -6,6 +6,7 @@
 
 use crate::lanes::Node;
 
+use super::fade::Trust;
 use super::situation::Situation;
 
 /// What a user of the paper's method chooses.
@@ -56,13 +57,13 @@ impl Ssh12 {
         Self { options, directions: directions.concat(), lengths, sigma }
     }
 
-    /// Writes `w` and returns `1 - g_0's share`.
-    pub(crate) fn weigh(&self, situation: &Situation<'_>, weights: &mut [f32]) -> f32 {
+    /// Writes `w`, which fade by themselves: the confidence is what the null example leaves.
+    pub(crate) fn weigh(&self, situation: &Situation<'_>, weights: &mut [f32]) -> Trust {
         let (u, n_free) = (situation.displacements, situation.displacements.len());
         let own = length(u);
         if own <= f32::MIN_POSITIVE {
             weights.fill(0.0);
-            return 0.0;
+            return Trust::NONE;
         }
         for (w, direction) in weights.iter_mut().zip(self.directions.chunks_exact(n_free)) {
             let r = product(direction, u) / own;
@@ -73,12 +74,12 @@ impl Ssh12 {
         let all = sum + self.options.null_weight as f32;
         if all <= 0.0 {
             weights.fill(0.0);
-            return 0.0;
+            return Trust::NONE;
         }
         for (w, length) in weights.iter_mut().zip(&self.lengths) {
             *w *= (own / length).min(LARGEST_RATIO) / all;
         }
-        sum / all
+        Trust { share: 1.0, confidence: sum / all }
     }
 
     fn kernel(&self, x: f32) -> f32 {
