@@ -12,6 +12,7 @@ mod coarse;
 mod database;
 mod error;
 mod example;
+mod examples_of;
 mod farthest;
 mod files;
 mod folder;
