@@ -11,6 +11,7 @@ mod canonical;
 mod coarse;
 mod database;
 mod error;
+pub mod evaluation;
 mod example;
 mod examples_of;
 mod farthest;
