@@ -17,8 +17,7 @@ pub struct Method {
     pub options: EnrichmentOptions,
 }
 
-/// Radius of stamps that something lies beyond, in coarse cells: where the window of the default chart is still whole, a blend
-/// would be nothing but a stamp.
+/// Radius of the paper's blend, in coarse cells: with the default chart, which covers most of the object, it would be a stamp.
 const BLEND_CELLS: f64 = 2.0;
 /// Width of radial basis functions, in coarse cells.
 const RBF_CELLS: f64 = 1.33;
@@ -78,10 +77,7 @@ pub fn methods(axes: [Vector3<f64>; 2]) -> Vec<Method> {
         ..own.field
     };
     let plain = |correlator, interpolator| {
-        let radius_cells = match interpolator {
-            Interpolator::Blend | Interpolator::Warp => BLEND_CELLS,
-            _ => own.radius_cells,
-        };
+        let radius_cells = if interpolator == Interpolator::Blend { BLEND_CELLS } else { own.radius_cells };
         EnrichmentOptions { correlator, radius_cells, field: FieldOptions { interpolator, ..plain }, ..own }
     };
     let baselines = [
