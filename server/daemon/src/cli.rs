@@ -41,6 +41,8 @@ pub enum Command {
     Train(TrainArgs),
     /// Judges every way to enrich by held-out accurate solutions: errors, time, degenerate inputs.
     Evaluate(EvaluateArgs),
+    /// Charts speed against accuracy, one point per configuration, as SVG and JSON.
+    Chart(ChartArgs),
     /// Prints the JSON Schema of scene files.
     Schema,
     /// Solves a case accurately: a mesh, its materials, supports and loads; prints what its probes tell.
@@ -227,6 +229,28 @@ pub struct EvaluateArgs {
     /// Learns from the first so many examples [default: all of them].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
     pub examples: Option<u32>,
+}
+
+/// `plicad chart`.
+#[derive(Debug, Args)]
+pub struct ChartArgs {
+    /// Scene file with a \[bench\] table, or `wedge` for the built-in one.
+    pub scene: PathBuf,
+    /// What is learned from, and judged by.
+    #[command(flatten)]
+    pub databases: DatabaseArgs,
+    /// Folder for chart.svg and chart.json [default: out/chart/SCENE].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Measures points again that an earlier run has finished.
+    #[arg(long)]
+    pub fresh: bool,
+    /// Leaves out other coarse models, each of which is driven to all held-out interactions anew.
+    #[arg(long)]
+    pub quick: bool,
+    /// Ticks to time for each coarse model.
+    #[arg(long, default_value_t = 3000, value_parser = clap::value_parser!(u64).range(100..=10_000_000))]
+    pub ticks: u64,
 }
 
 /// `plicad check`.

@@ -1,4 +1,4 @@
-//! `plicad evaluate` from outside.
+//! `plicad evaluate` and `plicad chart` from outside.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::fs;
@@ -25,6 +25,11 @@ evaluation = { examples = 3, outside = [{ name = "lift", action = "lift", exampl
 [tools.rod]
 shape = { capsule = { radius_m = 0.006, length_m = 0.1 } }
 friction = 0.8
+[bench]
+motion = [
+    { tool = "rod", time_s = 0.0, position_m = [0.02, 0.02, 0.027] },
+    { tool = "rod", time_s = 0.1, position_m = [0.02, 0.02, 0.024] },
+]
 "#;
 
 /// A folder with the scene in it.
@@ -109,4 +114,68 @@ fn what_cannot_be_evaluated_is_refused_in_words() {
     fs::write(place.0.path().join("block.toml"), SCENE.replace("3e4", "4e4")).unwrap();
     let message = errors(&place.run(&["evaluate", "block.toml"]));
     assert!(message.contains("belongs to another scene"), "{message}");
+}
+
+/// The names of the points with what they say, without what differs from run to run.
+fn points(chart: &Value) -> Vec<(String, f64, f64)> {
+    let point = |p: &Value| {
+        let mm = p["independent_mm"].as_f64().unwrap();
+        (p["name"].as_str().unwrap().to_owned(), mm, p["simulation_us"].as_f64().unwrap())
+    };
+    chart["points"].as_array().unwrap().iter().map(point).collect()
+}
+
+#[test]
+fn a_chart_has_a_front_and_goes_on_where_it_was() {
+    let place = Place::new();
+    place.train();
+    let arguments = ["chart", "block.toml", "--ticks", "100", "--json"];
+    let first = json(&place.run(&arguments));
+    let all = points(&first);
+    let names: Vec<&str> = all.iter().map(|p| p.0.as_str()).collect();
+    for name in [
+        "coarse",
+        "kriging-stamp",
+        "ssh12-blend, 16 examples",
+        "kriging-stamp, 64 texels",
+        "kriging-stamp, f32",
+        "coarse, full integration",
+        "coarse, 2 substeps",
+        "coarse, trilinear embedding",
+        "coarse, 6x6x4",
+    ] {
+        assert!(names.contains(&name), "{name} is not in {names:?}");
+    }
+    let mm = |name: &str| all.iter().find(|p| p.0 == name).unwrap().1;
+    assert!(mm("coarse, 6x6x4") < mm("coarse") && mm("kriging-stamp") < mm("coarse"));
+    // The front falls in error as it rises in time, and every other point is beaten by one of it.
+    let of = |name: &Value| first["points"].as_array().unwrap().iter().find(|p| p["name"] == *name).unwrap();
+    let place_of = |p: &Value| {
+        let tick = p["simulation_us"].as_f64().unwrap() + p["enrichment_us"].as_f64().unwrap();
+        [tick, p["independent_mm"].as_f64().unwrap()]
+    };
+    let front: Vec<[f64; 2]> = first["front"].as_array().unwrap().iter().map(|name| place_of(of(name))).collect();
+    assert!(!front.is_empty() && front.windows(2).all(|w| w[0][0] < w[1][0] && w[0][1] > w[1][1]), "{front:?}");
+    for p in first["points"].as_array().unwrap() {
+        let [tick, mm] = place_of(p);
+        assert!(front.iter().any(|f| f[0] <= tick && f[1] <= mm), "{p}");
+        assert_eq!(p["on_front"], first["front"].as_array().unwrap().contains(&p["name"]));
+    }
+    let svg = fs::read_to_string(place.0.path().join("out/chart/block/chart.svg")).unwrap();
+    assert!(svg.contains("block: speed against accuracy") && svg.contains("front: none is both"), "{svg}");
+
+    // What was measured is kept to the last bit; what is missing is made up for.
+    let file = place.0.path().join("out/chart/block/chart.json");
+    let mut stored: Value = serde_json::from_slice(&fs::read(&file).unwrap()).unwrap();
+    stored["points"].as_array_mut().unwrap().retain(|p| p["name"] != "rescale");
+    fs::write(&file, stored.to_string()).unwrap();
+    let again = json(&place.run(&arguments));
+    assert_eq!(points(&again), all);
+    // Other ticks are another measurement, and so is a fresh one.
+    let quick = json(&place.run(&["chart", "block.toml", "--ticks", "120", "--quick", "--json"]));
+    assert!(points(&quick).iter().all(|p| p.0 == "coarse" || !p.0.starts_with("coarse,")));
+    assert_ne!(quick["identity"], first["identity"]);
+    fs::write(&file, "{").unwrap();
+    let message = errors(&place.run(&arguments));
+    assert!(message.contains("chart.json: is no chart") && message.contains("--fresh"), "{message}");
 }

@@ -4,6 +4,7 @@
 mod common;
 
 use std::cell::RefCell;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use plica_training::evaluation::*;
 use plica_training::*;
@@ -120,4 +121,43 @@ fn databases_of_another_model_and_empty_regions_are_refused() {
     let default = &methods(setup.stamp_axes)[0];
     let message = judge.judge(default, 1).err().unwrap().to_string();
     assert!(message.contains("kriging-stamp") && message.contains("at least 2"), "{message}");
+}
+
+/// The scene's own model driven anew is as far from the accurate one as the database says; a finer one is nearer.
+#[test]
+fn another_coarse_model_is_compared_with_the_same_accurate_skins() {
+    let mut setup = setup();
+    setup.training.count = 2;
+    let (training, held_out) = (train(&setup, JobKind::Training), train(&setup, JobKind::Evaluation));
+    let coarse = Judge::new(&setup, &training, &held_out).unwrap().coarse().unwrap();
+    let told = AtomicUsize::new(0);
+    let done = || {
+        told.fetch_add(1, Relaxed);
+    };
+    let own = other_coarse(&setup, &held_out, &setup, 2, (&done, &|| false)).unwrap();
+    assert_eq!((own.states, own.failed, told.load(Relaxed)), (6, 0, 6));
+    let expected = coarse.in_region.independent_mm.unwrap();
+    assert!((own.independent_mm.median - expected.median).abs() < 1e-5, "{own:?} {expected:?}");
+    assert!((own.independent_mm.worst - expected.worst).abs() < 1e-5, "{own:?} {expected:?}");
+
+    let finer = common::setup(common::Shape {
+        coarse: plica_geometry::shapes::block([0.04, 0.04, 0.02], [6, 6, 4]),
+        accurate: setup.accurate.mesh.clone(),
+        skin: setup.coarse.skin.clone(),
+        region: vec![],
+        radius_m: 0.006,
+    });
+    let finer = Setup {
+        coarse: plica_sim::ModelDescription { skin: setup.coarse.skin.clone(), ..finer.coarse },
+        ..setup.clone()
+    };
+    let found = other_coarse(&setup, &held_out, &finer, 1, (&|| {}, &|| false)).unwrap();
+    println!("{own:?} {found:?}");
+    assert!(found.independent_mm.median < 0.8 * own.independent_mm.median);
+
+    let elsewhere = Setup { evaluation_seed: 9, drive: DriveOptions { window_s: 0.2, ..setup.drive }, ..setup.clone() };
+    let message = other_coarse(&elsewhere, &held_out, &setup, 1, (&|| {}, &|| false)).unwrap_err().to_string();
+    assert!(message.contains("another interaction"), "{message}");
+    let stopped = other_coarse(&setup, &held_out, &setup, 1, (&|| {}, &|| true)).unwrap_err().to_string();
+    assert!(stopped.contains("interrupted"), "{stopped}");
 }

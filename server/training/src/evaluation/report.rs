@@ -8,7 +8,7 @@ use super::methods::{DEFAULT_METHOD, Method};
 use super::verdict::Verdict;
 
 /// Methods that are judged with fewer examples as well.
-const WITH_FEWER: [&str; 3] = [DEFAULT_METHOD, "ssh12-blend", "ridge-vector"];
+pub const WITH_FEWER: [&str; 3] = [DEFAULT_METHOD, "ssh12-blend", "ridge-vector"];
 /// Numbers of examples.
 pub const EXAMPLE_COUNTS: [usize; 4] = [16, 32, 64, 128];
 
