@@ -229,6 +229,9 @@ pub struct EvaluateArgs {
     /// Learns from the first so many examples [default: all of them].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
     pub examples: Option<u32>,
+    /// Slides through the trained region as well, with an accurate solution at every step: second differences of the detail.
+    #[arg(long)]
+    pub slide: bool,
 }
 
 /// `plicad chart`.

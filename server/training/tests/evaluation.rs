@@ -161,3 +161,27 @@ fn another_coarse_model_is_compared_with_the_same_accurate_skins() {
     let stopped = other_coarse(&setup, &held_out, &setup, 1, (&|| {}, &|| true)).unwrap_err().to_string();
     assert!(stopped.contains("interrupted"), "{stopped}");
 }
+
+#[test]
+fn a_slide_is_smooth_where_the_accurate_solution_is() {
+    let mut setup = setup();
+    setup.evaluation.truncate(1);
+    setup.evaluation[0].count = 1;
+    let (training, held_out) = (train(&setup, JobKind::Training), train(&setup, JobKind::Evaluation));
+    let judge = Judge::new(&setup, &training, &held_out).unwrap();
+    let chosen: Vec<Method> = methods(setup.stamp_axes).into_iter().filter(|m| m.name != "rbf-vector").collect();
+    let found = slide(&setup, &judge, &chosen, usize::MAX, (&|_, _, _| {}, &|| false)).unwrap();
+    println!("{} states, {} rejected, {:?}", found.states, found.rejected, found.accurate);
+    found.methods.iter().for_each(|m| println!("{:26} {:?} {:?}", m.name, m.roughness, m.error));
+    // 16 mm to go at most, and the way down and up.
+    assert!((15..40).contains(&found.states), "{}", found.states);
+    assert_eq!(found.methods.len(), chosen.len());
+    let default = &found.methods[0];
+    assert!(default.error.unwrap().median < 0.6);
+    assert!(
+        default.roughness.max_mm < 2.0 * found.accurate.max_mm,
+        "no jump that the accurate solution knows nothing of"
+    );
+    let stopped = slide(&setup, &judge, &chosen, usize::MAX, (&|_, _, _| {}, &|| true)).unwrap_err().to_string();
+    assert!(stopped.contains("interrupted"), "{stopped}");
+}

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use plica_training::evaluation::{Evaluation, Judge, Method, evaluate, methods};
+use plica_training::evaluation::{Evaluation, Judge, Method, evaluate, methods, slide};
 
 use crate::cli::EvaluateArgs;
 use crate::training::setup;
@@ -22,9 +22,12 @@ pub fn run(args: &EvaluateArgs, json: bool) -> anyhow::Result<()> {
     let judge = Judge::new(&setup, &training, &held_out)?;
     let n_examples = args.examples.map_or(usize::MAX, |n| n as usize);
     let bar = bar();
-    let found = evaluate(&judge, &methods, n_examples, &|done, all, what| tell(&bar, done, all, what));
+    let told = |done: usize, all: usize, what: &str| tell(&bar, done, all, what);
+    let mut found = evaluate(&judge, &methods, n_examples, &told)?;
+    if args.slide {
+        found.slide = Some(slide(&setup, &judge, &methods, n_examples, (&told, &|| false))?);
+    }
     bar.finish_and_clear();
-    let found = found?;
     table::print(config.name(), &found);
     if json {
         println!("{}", summary(config.name(), &found)?);

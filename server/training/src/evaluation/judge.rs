@@ -154,6 +154,17 @@ impl Judge {
         self.whole.rms(detail, None)
     }
 
+    /// Largest length over the skin \[m\].
+    pub(super) fn largest(&self, detail: &[[f32; 3]]) -> f64 {
+        self.whole.largest(detail, None)
+    }
+
+    /// `E` of `detail` against `tied`; `None` where the coarse skin misses next to nothing.
+    pub(super) fn ratio(&self, detail: &[[f32; 3]], tied: &[[f32; 3]]) -> Option<f64> {
+        let own = self.rms(tied);
+        (own >= LEAST_DETAIL_M).then(|| self.whole.rms(detail, Some(tied)) / own)
+    }
+
     /// What `method` makes of all states, taught by the first `n_examples` examples.
     ///
     /// # Errors

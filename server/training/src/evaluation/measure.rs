@@ -64,7 +64,8 @@ impl Patch {
         (squared / self.area).sqrt()
     }
 
-    fn largest(&self, a: &Field, b: Option<&Field>) -> f64 {
+    /// Largest length of `a - b`, or of `a` alone \[m\].
+    pub(super) fn largest(&self, a: &Field, b: Option<&Field>) -> f64 {
         self.vertices.iter().map(|(v, _)| difference_squared(a, b, *v)).fold(0.0, f64::max).sqrt()
     }
 

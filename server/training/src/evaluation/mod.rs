@@ -11,6 +11,7 @@ mod other_coarse;
 mod pareto;
 mod prepared;
 mod report;
+mod slide;
 mod statistics;
 mod verdict;
 
@@ -21,5 +22,6 @@ pub use methods::{DEFAULT_METHOD, Method, methods};
 pub use other_coarse::{OtherCoarse, OtherCoarseError, other_coarse};
 pub use pareto::pareto_front;
 pub use report::{Counts, EXAMPLE_COUNTS, Evaluation, Judgement, Told, WITH_FEWER, evaluate};
+pub use slide::{Roughness, Slide, SlideError, slide};
 pub use statistics::{Quantiles, rank_correlation};
 pub use verdict::Verdict;

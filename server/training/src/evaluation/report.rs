@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::degenerate::Degenerate;
 use super::judge::{EvaluationError, Judge};
 use super::methods::{DEFAULT_METHOD, Method};
+use super::slide::Slide;
 use super::verdict::Verdict;
 
 /// Methods that are judged with fewer examples as well.
@@ -21,6 +22,8 @@ pub struct Evaluation {
     pub methods: Vec<Judgement>,
     /// Some methods with fewer examples.
     pub by_examples: Vec<Verdict>,
+    /// Along a slide, if it was asked for.
+    pub slide: Option<Slide>,
     /// Name of the way that enrichment goes unless told otherwise.
     pub default: String,
 }
@@ -80,6 +83,7 @@ pub fn evaluate(
         held_out: Counts { in_region, outside, left_out: judge.n_left_out() },
         methods: all,
         by_examples,
+        slide: None,
         default: DEFAULT_METHOD.to_owned(),
     })
 }

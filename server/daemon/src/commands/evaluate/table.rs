@@ -1,6 +1,6 @@
 //! What an evaluation found, for people.
 
-use plica_training::evaluation::{Evaluation, Group, Judgement, Quantiles, Verdict};
+use plica_training::evaluation::{Evaluation, Group, Judgement, Quantiles, Roughness, Slide, Verdict};
 
 pub(super) fn print(scene: &str, found: &Evaluation) {
     let n = found.held_out;
@@ -31,6 +31,18 @@ pub(super) fn print(scene: &str, found: &Evaluation) {
         println!("fewer examples");
         found.by_examples.iter().for_each(|v| row(v, &found.default));
     }
+    found.slide.iter().for_each(print_slide);
+}
+
+fn print_slide(slide: &Slide) {
+    let row =
+        |name: &str, r: &Roughness, error: &str| println!("{name:<27} {:>8.4} {:>8.3}   {error}", r.rms_mm, r.max_mm);
+    println!(
+        "slide: {} states {:.1} mm apart ({} rejected); second difference of d [mm], RMS and largest; E",
+        slide.states, slide.step_mm, slide.rejected
+    );
+    row("accurate (tied)", &slide.accurate, "");
+    slide.methods.iter().for_each(|m| row(&m.name, &m.roughness, &m.error.as_ref().map_or_else(String::new, three)));
 }
 
 fn row(v: &Verdict, default: &str) {
