@@ -39,6 +39,10 @@ pub enum Command {
     Check(CheckArgs),
     /// Makes examples of a scene: the tool interacts, both models settle, what the coarse one misses is kept.
     Train(TrainArgs),
+    /// Judges every way to enrich by held-out accurate solutions: errors, time, degenerate inputs.
+    Evaluate(EvaluateArgs),
+    /// Charts speed against accuracy, one point per configuration, as SVG and JSON.
+    Chart(ChartArgs),
     /// Prints the JSON Schema of scene files.
     Schema,
     /// Solves a case accurately: a mesh, its materials, supports and loads; prints what its probes tell.
@@ -198,6 +202,58 @@ pub enum TrainKind {
     Training,
     /// Held out, in the trained region and outside of it, with both references.
     Evaluation,
+}
+
+/// The two databases of a scene.
+#[derive(Debug, Args)]
+pub struct DatabaseArgs {
+    /// Examples to learn from [default: out/train/SCENE-training/database.safetensors].
+    #[arg(long, value_name = "FILE")]
+    pub training: Option<PathBuf>,
+    /// Held-out examples to judge by [default: out/train/SCENE-evaluation/database.safetensors].
+    #[arg(long, value_name = "FILE")]
+    pub held_out: Option<PathBuf>,
+}
+
+/// `plicad evaluate`.
+#[derive(Debug, Args)]
+pub struct EvaluateArgs {
+    /// Scene file; left out: the built-in wedge.
+    pub scene: Option<PathBuf>,
+    /// What is learned from, and judged by.
+    #[command(flatten)]
+    pub databases: DatabaseArgs,
+    /// Methods, separated by commas [default: all of them].
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub methods: Vec<String>,
+    /// Learns from the first so many examples [default: all of them].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    pub examples: Option<u32>,
+    /// Slides through the trained region as well, with an accurate solution at every step: second differences of the detail.
+    #[arg(long)]
+    pub slide: bool,
+}
+
+/// `plicad chart`.
+#[derive(Debug, Args)]
+pub struct ChartArgs {
+    /// Scene file with a \[bench\] table, or `wedge` for the built-in one.
+    pub scene: PathBuf,
+    /// What is learned from, and judged by.
+    #[command(flatten)]
+    pub databases: DatabaseArgs,
+    /// Folder for chart.svg and chart.json [default: out/chart/SCENE].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Measures points again that an earlier run has finished.
+    #[arg(long)]
+    pub fresh: bool,
+    /// Leaves out other coarse models, each of which is driven to all held-out interactions anew.
+    #[arg(long)]
+    pub quick: bool,
+    /// Ticks to time for each coarse model.
+    #[arg(long, default_value_t = 3000, value_parser = clap::value_parser!(u64).range(100..=10_000_000))]
+    pub ticks: u64,
 }
 
 /// `plicad check`.

@@ -96,6 +96,20 @@ impl Coarse {
         cancelled: Cancelled<'_>,
     ) -> Result<CoarseResult, Interrupted> {
         self.restart();
+        self.go_on(tool, way, drive, cancelled)
+    }
+
+    /// The same from the present state, in which the tool is where the way begins.
+    ///
+    /// # Errors
+    /// [`Interrupted`].
+    pub fn go_on(
+        &mut self,
+        tool: usize,
+        way: &Way,
+        drive: &DriveOptions,
+        cancelled: Cancelled<'_>,
+    ) -> Result<CoarseResult, Interrupted> {
         let n_ticks = (way.length_m() / (drive.speed_m_per_s * self.model.timestep_s())).ceil() as u64;
         for k in 0..=n_ticks {
             self.tick(Some((tool, way.at(k as f64 / n_ticks.max(1) as f64))), cancelled)?;

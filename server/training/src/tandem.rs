@@ -190,12 +190,39 @@ impl<'a> Tandem<'a> {
         let nothing = || Stop::Rejected(Reason::NothingTouched, "the tool passes the object by".into());
         let way = Way::of(interaction, &self.obstacles[tool], &self.skin).ok_or_else(nothing)?;
         let state = self.coarse.press(tool, &way, &setup.drive, cancelled)?;
-        let contact = self.skin.nearest(&state.contact_point.ok_or_else(nothing)?);
-        let targets = around_tool(&self.skin, &state.offsets, &self.obstacles[tool], way.end(), &setup.tie);
-        if targets.is_empty() {
-            return Err(nothing());
+        self.under_tool(tool, way, state).ok_or_else(nothing)
+    }
+
+    /// `None` if nothing is touched.
+    fn under_tool(&self, tool: usize, way: Way, state: CoarseResult) -> Option<CoarseHalf> {
+        let contact = self.skin.nearest(&state.contact_point?);
+        let targets = around_tool(&self.skin, &state.offsets, &self.obstacles[tool], way.end(), &self.setup.tie);
+        let is_touched = !targets.is_empty();
+        is_touched.then(|| CoarseHalf { contact, pose: *way.end(), targets, load: Load::Tool(way), state })
+    }
+
+    /// The coarse model settles at one pose after the other, on one way from rest. `None` where nothing is touched.
+    ///
+    /// # Errors
+    /// [`Interrupted`].
+    pub fn walk(
+        &mut self,
+        tool: usize,
+        poses: &[Isometry3<f64>],
+        mut each: impl FnMut(&mut Self, Option<CoarseHalf>) -> Result<(), Interrupted>,
+        cancelled: Cancelled<'_>,
+    ) -> Result<(), Interrupted> {
+        let drive = self.setup.drive;
+        for (i, pose) in poses.iter().enumerate() {
+            let way = Way::new(poses[i.saturating_sub(1)..i].iter().chain([pose]).copied().collect());
+            let state = match i {
+                0 => self.coarse.press(tool, &way, &drive, cancelled)?,
+                _ => self.coarse.go_on(tool, &way, &drive, cancelled)?,
+            };
+            let half = self.under_tool(tool, way, state);
+            each(self, half)?;
         }
-        Ok(CoarseHalf { contact, pose: *way.end(), targets, load: Load::Tool(way), state })
+        Ok(())
     }
 
     fn lift_coarse(

@@ -1,9 +1,11 @@
 //! One file per command.
 
 pub mod bench;
+pub mod chart;
 pub mod check;
 pub mod child;
 pub mod demo;
+pub mod evaluate;
 pub mod schema;
 pub mod serve;
 pub mod simulate;
@@ -24,6 +26,8 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Bench(args) => bench::run(args, cli.json),
         Command::Check(args) => check::run(args, cli.json),
         Command::Train(args) => train::run(args, cli.json),
+        Command::Evaluate(args) => evaluate::run(args, cli.json),
+        Command::Chart(args) => chart::run(args, cli.json),
         Command::Schema => schema::run(cli.json),
         Command::Solve(args) => solve::run(args, cli.json),
         Command::Child(args) => child::run(args),

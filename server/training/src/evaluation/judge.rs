@@ -1,0 +1,206 @@
+//! Held-out states that ways to enrich are judged by.
+
+use nalgebra::Point3;
+use plica_geometry::ReferenceSkin;
+use plica_sim::enrichment::{Enricher, EnricherError, Examples, Touch};
+use plica_sim::{Model, ModelError};
+
+use super::measure::Patch;
+use super::methods::Method;
+use super::prepared::{Outcome, Prepared};
+use super::verdict::{Judged, Verdict};
+use crate::database::Database;
+use crate::obstacle::radius_m;
+use crate::setup::Setup;
+
+/// Kind of the states that are drawn as training draws.
+pub const IN_REGION: &str = "in_region";
+/// Name of the skin without enrichment.
+pub const COARSE: &str = "coarse";
+/// States that the coarse skin misses by less are left out \[m\].
+const LEAST_DETAIL_M: f64 = 2e-5;
+/// What is near the contact, in radii of the tool.
+const NEAR_RADII: f64 = 3.0;
+
+/// Why nothing can be judged.
+#[derive(Debug, thiserror::Error)]
+pub enum EvaluationError {
+    /// The coarse model cannot be built.
+    #[error("coarse model: {0}")]
+    Model(#[from] ModelError),
+    /// A method cannot be prepared.
+    #[error("method `{method}`: {source}")]
+    Method {
+        /// Its name.
+        method: String,
+        /// Why.
+        source: EnricherError,
+    },
+    /// A held-out state belongs to another model.
+    #[error("held-out example {index}: {found} {what}, the scene has {expected}")]
+    Length {
+        /// Its number.
+        index: u32,
+        /// Which array.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// The scene's.
+        expected: usize,
+    },
+    /// There is nothing to judge by.
+    #[error(
+        "none of {n} held-out examples lies in the trained region and has detail of {least_mm} mm or more",
+        least_mm = 1e3 * LEAST_DETAIL_M
+    )]
+    NothingInRegion {
+        /// Held-out examples.
+        n: usize,
+    },
+}
+
+/// Held-out states, and the examples to learn from.
+pub struct Judge {
+    model: Model,
+    whole: Patch,
+    states: Vec<HeldOut>,
+    left_out: usize,
+    examples: Examples,
+}
+
+struct HeldOut {
+    kind: String,
+    displacements: Vec<[f32; 3]>,
+    touch: Touch,
+    near: Patch,
+    tied: Vec<[f32; 3]>,
+    independent: Option<Vec<[f32; 3]>>,
+}
+
+impl Judge {
+    /// Takes in both databases of a scene.
+    ///
+    /// # Errors
+    /// See [`EvaluationError`].
+    pub fn new(setup: &Setup, training: &Database, held_out: &Database) -> Result<Self, EvaluationError> {
+        let model = Model::new(setup.coarse.clone())?;
+        let skin = ReferenceSkin::new(&setup.coarse.skin);
+        let areas = skin.vertex_areas();
+        let whole = Patch::new(areas, |_| true);
+        let mut states = Vec::new();
+        for e in &held_out.examples {
+            let nodes = ("nodes", e.displacements.len(), model.n_nodes());
+            for (what, found, expected) in [nodes, ("skin vertices", e.detail.len(), model.n_skin())] {
+                if found != expected {
+                    return Err(EvaluationError::Length { index: e.record.index, what, found, expected });
+                }
+            }
+            if whole.rms(&e.detail, None) < LEAST_DETAIL_M {
+                continue;
+            }
+            let reach = NEAR_RADII * radius_m(&setup.coarse.tools[e.record.tool as usize].shape);
+            let contact = Point3::from(e.contact_point);
+            states.push(HeldOut {
+                kind: e.record.kind.clone(),
+                displacements: e.displacements.clone(),
+                touch: e.touch(),
+                near: Patch::new(areas, |v| (skin.skin().positions()[v] - contact).norm() <= reach),
+                tied: e.detail.clone(),
+                independent: e.independent_detail.clone(),
+            });
+        }
+        let n = held_out.examples.len();
+        if !states.iter().any(|s| s.kind == IN_REGION) {
+            return Err(EvaluationError::NothingInRegion { n });
+        }
+        Ok(Self { model, whole, left_out: n - states.len(), states, examples: training.leading_examples(usize::MAX) })
+    }
+
+    /// States that are judged: in the region, and outside of it.
+    pub fn n_states(&self) -> [usize; 2] {
+        let inside = self.states.iter().filter(|s| s.kind == IN_REGION).count();
+        [inside, self.states.len() - inside]
+    }
+
+    /// States that the coarse skin hardly misses.
+    pub fn n_left_out(&self) -> usize {
+        self.left_out
+    }
+
+    /// Examples to learn from.
+    pub fn n_examples(&self) -> usize {
+        self.examples.touches.len()
+    }
+
+    /// The first `n` examples to learn from.
+    pub(super) fn examples(&self, n: usize) -> Examples {
+        let n = n.min(self.n_examples());
+        Examples {
+            displacements: self.examples.displacements[..n].to_vec(),
+            details: self.examples.details[..n].to_vec(),
+            touches: self.examples.touches[..n].to_vec(),
+        }
+    }
+
+    /// A way to enrich with what it needs to be run.
+    pub(super) fn prepare(&self, method: &Method, examples: &Examples) -> Result<Prepared<'_>, EvaluationError> {
+        let failed = |source| EvaluationError::Method { method: method.name.clone(), source };
+        let enricher = Enricher::new(&self.model, examples, method.options).map_err(failed)?;
+        Ok(Prepared::new(&self.model, enricher))
+    }
+
+    /// Area-weighted RMS over the skin \[m\].
+    pub(super) fn rms(&self, detail: &[[f32; 3]]) -> f64 {
+        self.whole.rms(detail, None)
+    }
+
+    /// Largest length over the skin \[m\].
+    pub(super) fn largest(&self, detail: &[[f32; 3]]) -> f64 {
+        self.whole.largest(detail, None)
+    }
+
+    /// `E` of `detail` against `tied`; `None` where the coarse skin misses next to nothing.
+    pub(super) fn ratio(&self, detail: &[[f32; 3]], tied: &[[f32; 3]]) -> Option<f64> {
+        let own = self.rms(tied);
+        (own >= LEAST_DETAIL_M).then(|| self.whole.rms(detail, Some(tied)) / own)
+    }
+
+    /// What `method` makes of all states, taught by the first `n_examples` examples.
+    ///
+    /// # Errors
+    /// [`EvaluationError::Method`].
+    pub fn judge(&self, method: &Method, n_examples: usize) -> Result<Verdict, EvaluationError> {
+        self.judge_with(method, &self.examples(n_examples))
+    }
+
+    pub(super) fn judge_with(&self, method: &Method, examples: &Examples) -> Result<Verdict, EvaluationError> {
+        let mut prepared = self.prepare(method, examples)?;
+        let judged = self.run(|s| prepared.evaluate_timed(&s.displacements, &s.touch));
+        let named = (method.name.as_str(), method.correlator(), method.interpolator());
+        let nothing = || EvaluationError::NothingInRegion { n: self.states.len() };
+        let taught = (examples.touches.len(), prepared.table_bytes());
+        Verdict::of(named, taught, &judged).ok_or_else(nothing)
+    }
+
+    /// What the skin is without enrichment: `E` is 1, but the millimetres tell.
+    ///
+    /// # Errors
+    /// [`EvaluationError::NothingInRegion`].
+    pub fn coarse(&self) -> Result<Verdict, EvaluationError> {
+        let nothing = vec![[0.0; 3]; self.model.n_skin()];
+        let judged = self.run(|_| Outcome { detail: nothing.clone(), confidence: 0.0, time_us: 0.0 });
+        let no_state = || EvaluationError::NothingInRegion { n: self.states.len() };
+        Verdict::of((COARSE, "none", "none"), (0, 0), &judged).ok_or_else(no_state)
+    }
+
+    fn run(&self, mut outcome: impl FnMut(&HeldOut) -> Outcome) -> Vec<Judged<'_>> {
+        let judge = |state| {
+            let Outcome { detail, confidence, time_us } = outcome(state);
+            let independent = state.independent.as_deref();
+            let whole = self.whole.measure(&detail, &state.tied, independent)?;
+            let near = state.near.measure(&detail, &state.tied, independent);
+            Some(Judged { kind: &state.kind, whole, near, confidence, time_us })
+        };
+        self.states.iter().filter_map(judge).collect()
+    }
+}

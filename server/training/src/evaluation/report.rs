@@ -1,0 +1,89 @@
+//! All methods on the same held-out states.
+
+use serde::{Deserialize, Serialize};
+
+use super::degenerate::Degenerate;
+use super::judge::{EvaluationError, Judge};
+use super::methods::{DEFAULT_METHOD, Method};
+use super::slide::Slide;
+use super::verdict::Verdict;
+
+/// Methods that are judged with fewer examples as well.
+pub const WITH_FEWER: [&str; 3] = [DEFAULT_METHOD, "ssh12-blend", "ridge-vector"];
+/// Numbers of examples.
+pub const EXAMPLE_COUNTS: [usize; 4] = [16, 32, 64, 128];
+
+/// All methods on the same held-out states.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Evaluation {
+    /// States that methods are judged by.
+    pub held_out: Counts,
+    /// The coarse skin, then every method with all examples.
+    pub methods: Vec<Judgement>,
+    /// Some methods with fewer examples.
+    pub by_examples: Vec<Verdict>,
+    /// Along a slide, if it was asked for.
+    pub slide: Option<Slide>,
+    /// Name of the way that enrichment goes unless told otherwise.
+    pub default: String,
+}
+
+/// Numbers of states.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Counts {
+    /// Drawn as training draws.
+    pub in_region: usize,
+    /// All others.
+    pub outside: usize,
+    /// Not judged by, since the coarse skin misses next to nothing there.
+    pub left_out: usize,
+}
+
+/// A method on held-out states and on degenerate inputs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Judgement {
+    /// On held-out states.
+    #[serde(flatten)]
+    pub verdict: Verdict,
+    /// On degenerate inputs; the coarse skin has none.
+    pub degenerate: Option<Degenerate>,
+}
+
+/// Told before each part of the work: parts done, parts in all, what comes.
+pub type Told<'a> = &'a dyn Fn(usize, usize, &str);
+
+/// Judges `methods` with the first `n_examples` examples, and some of them with fewer.
+///
+/// # Errors
+/// See [`EvaluationError`].
+pub fn evaluate(
+    judge: &Judge,
+    methods: &[Method],
+    n_examples: usize,
+    told: Told<'_>,
+) -> Result<Evaluation, EvaluationError> {
+    let n_examples = n_examples.min(judge.n_examples());
+    let with_fewer = methods.iter().filter(|m| WITH_FEWER.contains(&m.name.as_str()));
+    let counts = EXAMPLE_COUNTS.into_iter().filter(|n| *n <= n_examples);
+    let fewer: Vec<(&Method, usize)> = with_fewer.flat_map(|m| counts.clone().map(move |n| (m, n))).collect();
+    let n_parts = methods.len() + fewer.len();
+    let mut all = vec![Judgement { verdict: judge.coarse()?, degenerate: None }];
+    for (done, method) in methods.iter().enumerate() {
+        told(done, n_parts, &method.name);
+        let verdict = judge.judge(method, n_examples)?;
+        all.push(Judgement { verdict, degenerate: Some(judge.degenerate(method, n_examples)?) });
+    }
+    let mut by_examples = Vec::new();
+    for (done, (method, n)) in fewer.into_iter().enumerate() {
+        told(methods.len() + done, n_parts, &format!("{} with {n} examples", method.name));
+        by_examples.push(judge.judge(method, n)?);
+    }
+    let [in_region, outside] = judge.n_states();
+    Ok(Evaluation {
+        held_out: Counts { in_region, outside, left_out: judge.n_left_out() },
+        methods: all,
+        by_examples,
+        slide: None,
+        default: DEFAULT_METHOD.to_owned(),
+    })
+}

@@ -1,0 +1,84 @@
+//! What a method makes of all held-out states.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::IN_REGION;
+use super::measure::{Group, Measure};
+use super::statistics::{quantile, rank_correlation};
+
+/// What a method makes of all states.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// Of the method.
+    pub name: String,
+    /// How states are compared.
+    pub correlator: String,
+    /// How detail is laid on the skin.
+    pub interpolator: String,
+    /// Examples that it learned from.
+    pub examples: usize,
+    /// Whole skin, states drawn as training draws.
+    pub in_region: Group,
+    /// Within three tool radii of the contact point on the reference skin, the same states.
+    pub near_contact: Group,
+    /// Whole skin, all other states.
+    pub outside: Option<Group>,
+    /// Whole skin, by kind.
+    pub kinds: BTreeMap<String, Group>,
+    /// Rank correlation of `1 - confidence` with `E` in the region; absent where either is the same everywhere.
+    pub confidence_rank_in_region: Option<f64>,
+    /// The same over all states.
+    pub confidence_rank: Option<f64>,
+    /// Median time of an evaluation on one thread, after one that is not timed \[us\].
+    pub tick_us: f64,
+    /// Least time \[us\].
+    pub tick_us_min: f64,
+    /// Bytes of the examples' tables.
+    pub table_bytes: usize,
+}
+
+/// One state as a method leaves it.
+pub(super) struct Judged<'a> {
+    pub(super) kind: &'a str,
+    pub(super) whole: Measure,
+    pub(super) near: Option<Measure>,
+    pub(super) confidence: f64,
+    pub(super) time_us: f64,
+}
+
+impl Verdict {
+    /// Of all states; `None` where none lies in the region.
+    pub(super) fn of(
+        (name, correlator, interpolator): (&str, &str, &str),
+        (examples, table_bytes): (usize, usize),
+        judged: &[Judged<'_>],
+    ) -> Option<Self> {
+        let group = |is_in: &dyn Fn(&str) -> bool| {
+            Group::of(&judged.iter().filter(|j| is_in(j.kind)).map(|j| j.whole).collect::<Vec<_>>())
+        };
+        let inside: Vec<&Judged<'_>> = judged.iter().filter(|j| j.kind == IN_REGION).collect();
+        let near: Vec<Measure> = inside.iter().filter_map(|j| j.near).collect();
+        let kinds = judged.iter().map(|j| j.kind.to_owned());
+        let kinds = kinds.filter_map(|kind| Some((kind.clone(), group(&|k| k == kind)?))).collect();
+        let mut times: Vec<f64> = judged.iter().map(|j| j.time_us).collect();
+        times.sort_by(f64::total_cmp);
+        let ranks = |j: &Judged<'_>| (1.0 - j.confidence, j.whole.ratio);
+        Some(Self {
+            name: name.to_owned(),
+            correlator: correlator.to_owned(),
+            interpolator: interpolator.to_owned(),
+            examples,
+            in_region: group(&|k| k == IN_REGION)?,
+            near_contact: Group::of(&near)?,
+            outside: group(&|k| k != IN_REGION),
+            kinds,
+            confidence_rank_in_region: rank_correlation(&inside.iter().map(|j| ranks(j)).collect::<Vec<_>>()),
+            confidence_rank: rank_correlation(&judged.iter().map(ranks).collect::<Vec<_>>()),
+            tick_us: quantile(&times, 0.5).unwrap_or(0.0),
+            tick_us_min: times.first().copied().unwrap_or(0.0),
+            table_bytes,
+        })
+    }
+}
