@@ -84,6 +84,9 @@ pub struct ServeArgs {
     /// Ticks only when rpc/step says so.
     #[arg(long)]
     pub lock_step: bool,
+    /// Examples to enrich the skin with, in place of those that the scene names.
+    #[arg(long, value_name = "FILE")]
+    pub database: Option<PathBuf>,
     /// Folder for jobs and their results; one daemon at a time uses it.
     #[arg(long, value_name = "DIR", help = DATA_HELP)]
     pub data: Option<PathBuf>,
@@ -123,6 +126,9 @@ pub struct SimulateArgs {
     /// Result, a safetensors file.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
+    /// Examples to enrich the skin with, in place of those that the scene names.
+    #[arg(long, value_name = "FILE")]
+    pub database: Option<PathBuf>,
     /// One frame every so many ticks.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub every: u64,
@@ -145,6 +151,9 @@ pub struct BenchArgs {
     /// Element in place of the scene's.
     #[arg(long)]
     pub element: Option<Element>,
+    /// Examples to enrich the skin with, in place of those that the scene names.
+    #[arg(long, value_name = "FILE")]
+    pub database: Option<PathBuf>,
 }
 
 /// Elements by name.

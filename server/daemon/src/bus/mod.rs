@@ -28,6 +28,7 @@ use plica_sim::Model;
 use zenoh::{Session, Wait};
 
 use crate::config::PublishConfig;
+use crate::enrichment::Enrichment;
 use crate::jobs::Jobs;
 use crate::realtime::{Grants, Ports};
 
@@ -100,6 +101,8 @@ pub struct Parts {
     pub scene: Scene,
     /// The scene's model.
     pub model: Arc<Model>,
+    /// What makes examples ready.
+    pub enrichment: Enrichment,
     /// The simulation thread's other ends.
     pub ports: Ports,
     /// What the simulation thread was granted.
@@ -131,6 +134,7 @@ struct Shared {
     keys: Keys,
     scene: Scene,
     model: Arc<Model>,
+    enrichment: Enrichment,
     intake: Arc<PoseIntake>,
     counters: Arc<SharedCounters>,
     jobs: Jobs,
@@ -146,7 +150,7 @@ impl Bus {
 
     /// Declares every key and starts the threads.
     pub fn start(parts: Parts) -> Result<Self, BusError> {
-        let Parts { session, keys, scene, model, ports, grants, jobs } = parts;
+        let Parts { session, keys, scene, model, enrichment, ports, grants, jobs } = parts;
         let Ports { poses, commands, frames, wrenches, readings, statistics } = ports;
         let counters = Arc::new(SharedCounters::default());
         let intake = Arc::new(PoseIntake::new(&scene, poses));
@@ -156,6 +160,7 @@ impl Bus {
             keys,
             scene,
             model,
+            enrichment,
             intake,
             counters,
             jobs,
