@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use plica_protocol::jobs::{Job, JobKind, Progress};
 use plica_protocol::pose::Pose;
-use plica_protocol::rpc::{ErrorCode, ErrorReply, SnapshotReply, StateReply, StepReply};
+use plica_protocol::rpc::{ActivateReply, ErrorCode, ErrorReply, SnapshotReply, StateReply, StepReply};
 use plica_protocol::skin::{SkinFlags, SkinHeader};
 use plica_protocol::status::{Distribution, ObjectStatus, Realtime, Scheduling, SolverStatus, ToolStatus};
 use plica_protocol::wrench::{Wrench, WrenchFlags};
@@ -143,6 +143,15 @@ pub fn step_reply(outcome: &Outcome) -> StepReply {
 /// Reply of `snapshot`.
 pub fn snapshot_reply(outcome: &Outcome) -> SnapshotReply {
     SnapshotReply { id: outcome.snapshot.unwrap_or_default().to_string() }
+}
+
+/// Reply of `activate`.
+pub fn activate_reply(outcome: &Outcome, n_examples: usize) -> ActivateReply {
+    ActivateReply {
+        tick: outcome.tick,
+        database_generation: outcome.database_generation,
+        examples: u32::try_from(n_examples).unwrap_or(u32::MAX),
+    }
 }
 
 /// What a job makes.

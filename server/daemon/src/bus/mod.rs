@@ -3,6 +3,7 @@
 //! Callbacks run on Zenoh's receiving threads: they decode, store and return, and no panic leaves them. Streams are
 //! published, and questions answered, by threads of their own, so that a frozen client can hold up a reply but no tick.
 
+mod activate;
 mod counters;
 mod guard;
 mod intake;
@@ -174,14 +175,15 @@ impl Bus {
         let sources = status::Sources { readings, statistics, grants, published };
         let (status_queries, status_thread) = status::start(&shared, sources, replies.clone())?;
         let (job_requests, job_thread) = jobs::start(&shared, replies.clone())?;
-        let (rpc_queries, rpc_thread) = rpc::start(&shared, commands, replies.clone(), job_requests)?;
+        let (rpc_queries, rpc_threads) = rpc::start(&shared, commands, replies.clone(), job_requests)?;
         let mesh_queries = mesh::declare(&shared, replies)?;
         let declared = Declared {
             _poses: poses::declare(&shared)?,
             _queryables: vec![skin_queries, status_queries, rpc_queries, mesh_queries],
             _alive: alive(&shared)?,
         };
-        let threads = vec![reply_thread, skin_thread, wrench_thread, status_thread, rpc_thread, job_thread];
+        let mut threads = vec![reply_thread, skin_thread, wrench_thread, status_thread, job_thread];
+        threads.extend(rpc_threads);
         let wake = threads.iter().map(|t| t.thread().clone()).collect();
         Ok(Self { session, stop, threads, wake, _declared: declared })
     }
