@@ -29,7 +29,7 @@ pub struct Cli {
 pub enum Command {
     /// Runs a scene in real time and serves it on the bus until Ctrl-C.
     Serve(ServeArgs),
-    /// Serves on loopback, drives the tool through a real client, prints a summary, writes a picture and a GLB.
+    /// Trains a few examples, serves on loopback, drives the tool through a real client, prints a summary, writes pictures.
     Demo(DemoArgs),
     /// Runs a scene along recorded poses, without bus or clock; the same input gives the same bytes.
     Simulate(SimulateArgs),
@@ -238,7 +238,10 @@ pub struct DemoArgs {
     /// Maps the trajectory's box into the room above the object.
     #[arg(long, requires = "poses")]
     pub fit: bool,
-    /// Folder for picture and GLB.
+    /// Folder for pictures, GLB, and the examples that the first run trains.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
+    /// How many examples the first run trains.
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    pub examples: u32,
 }
