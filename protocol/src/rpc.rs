@@ -38,11 +38,13 @@ pub enum Method {
     JobResume,
     /// A result, in pieces. Request [`crate::jobs::JobFetchRequest`], reply bytes with a [`crate::chunk::ChunkHeader`].
     JobFetch,
+    /// Enriches with other examples. Request [`ActivateRequest`], reply [`ActivateReply`].
+    Activate,
 }
 
 impl Method {
     /// All methods.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Reset,
         Self::Pause,
         Self::Resume,
@@ -55,6 +57,7 @@ impl Method {
         Self::JobCancel,
         Self::JobResume,
         Self::JobFetch,
+        Self::Activate,
     ];
 
     /// The last part of the key.
@@ -72,6 +75,7 @@ impl Method {
             Self::JobCancel => "job_cancel",
             Self::JobResume => "job_resume",
             Self::JobFetch => "job_fetch",
+            Self::Activate => "activate",
         }
     }
 
@@ -164,6 +168,33 @@ pub struct RestoreRequest {
     pub id: String,
 }
 
+/// Names examples to enrich with.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ActivateRequest {
+    /// Id of a job that is done (digits only), or path of a database on the daemon's machine.
+    pub database: String,
+}
+
+impl ActivateRequest {
+    /// The id, if it names a job.
+    pub fn job(&self) -> Option<&str> {
+        let is_id = !self.database.is_empty() && self.database.bytes().all(|b| b.is_ascii_digit());
+        is_id.then_some(self.database.as_str())
+    }
+}
+
+/// Which examples enrich from now on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ActivateReply {
+    /// Frames of later ticks are made with them.
+    pub tick: u64,
+    /// What those frames carry.
+    pub database_generation: u32,
+    /// How many examples there are.
+    pub examples: u32,
+}
+
 /// Where the simulation stands after `reset`, `pause`, `resume` or `restore`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StateReply {
@@ -245,6 +276,8 @@ pub enum ErrorCode {
     TooManyJobs,
     /// The daemon takes no jobs: its data folder cannot be used.
     JobsUnavailable,
+    /// Examples that cannot be used: no such file, damaged, or of another scene; the message says which.
+    BadDatabase,
     /// `?offset=` is no number or beyond the end.
     BadOffset,
     /// Nothing to answer with yet, for instance no frame.
@@ -261,7 +294,7 @@ pub enum ErrorCode {
 
 impl ErrorCode {
     /// All codes.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 21] = [
         Self::RpcUnknown,
         Self::RpcWildcard,
         Self::RpcMalformed,
@@ -276,6 +309,7 @@ impl ErrorCode {
         Self::JobState,
         Self::TooManyJobs,
         Self::JobsUnavailable,
+        Self::BadDatabase,
         Self::BadOffset,
         Self::NotReady,
         Self::Busy,
@@ -301,6 +335,7 @@ impl ErrorCode {
             Self::JobState => "job_state",
             Self::TooManyJobs => "too_many_jobs",
             Self::JobsUnavailable => "jobs_unavailable",
+            Self::BadDatabase => "bad_database",
             Self::BadOffset => "bad_offset",
             Self::NotReady => "not_ready",
             Self::Busy => "busy",

@@ -71,6 +71,16 @@ fn requests_of_another_shape_are_malformed() {
 }
 
 #[test]
+fn digits_name_a_job_and_everything_else_a_file() {
+    let read = |json: &str| decode_request::<ActivateRequest>(json.as_bytes());
+    assert_eq!(read(r#"{"database": "0012"}"#).unwrap().job(), Some("0012"));
+    for path in ["", "./0012", "wedge.safetensors", "/data/1"] {
+        assert_eq!(ActivateRequest { database: path.into() }.job(), None, "{path}");
+    }
+    assert_eq!(read("{}").unwrap_err().code, "rpc_malformed");
+}
+
+#[test]
 fn methods_and_codes() {
     for method in Method::ALL {
         assert_eq!(Method::parse(method.name()).unwrap(), method);
@@ -78,7 +88,7 @@ fn methods_and_codes() {
     let error = Method::parse("rest").unwrap_err();
     assert_eq!(
         error.to_json(),
-        r#"{"code":"rpc_unknown","message":"no method `rest`; there are reset, pause, resume, step, snapshot, restore, job_submit, job_list, job_get, job_cancel, job_resume, job_fetch","retryable":false}"#
+        r#"{"code":"rpc_unknown","message":"no method `rest`; there are reset, pause, resume, step, snapshot, restore, job_submit, job_list, job_get, job_cancel, job_resume, job_fetch, activate","retryable":false}"#
     );
     assert!(ErrorReply::new(ErrorCode::Busy, "").retryable);
 }

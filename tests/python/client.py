@@ -16,11 +16,11 @@ SKIN = struct.Struct("<4sHHQQdQIIfIfI")
 WRENCH = struct.Struct("<4sHHQQdQQ3d3d3d3d4dIIfI")
 assert (POSE.size, SKIN.size, WRENCH.size) == (96, 64, 192)
 
-NORMALS_FOLLOW, SIXTEEN_BIT, SLEEPING = 8, 16, 4
+ENRICHED, NORMALS_FOLLOW, SIXTEEN_BIT, SLEEPING = 1, 8, 16, 4
 TIMEOUT_S = 20.0
 
-Frame = namedtuple("Frame", "sequence tick sim_time_s pose_time_ns flags confidence positions")
-Wrench = namedtuple("Wrench", "sequence tick sim_time_s pose_sequence pose_time_ns force torque flags n_contacts")
+Frame = namedtuple("Frame", "sequence tick sim_time_s pose_time_ns flags confidence generation positions")
+Wrench = namedtuple("Wrench", "sequence tick sim_time_s pose_sequence pose_time_ns force torque flags n_contacts confidence")
 
 
 class ErrorReply(Exception):
@@ -153,19 +153,20 @@ def pose(position, *, sequence=0, source_id=1, time_ns=None, orientation=(0, 0, 
 
 
 def read_frame(data):
-    magic, version, size, sequence, tick, sim_time, pose_time, n, flags, confidence, _, scale, _ = SKIN.unpack_from(data)
+    magic, version, size, sequence, tick, sim_time, pose_time, n, flags, confidence, generation, scale, _ = SKIN.unpack_from(data)
     assert (magic, version, size) == (b"PLSK", 1, 64)
     assert not flags & SIXTEEN_BIT, "this client reads the f32 format"
     assert len(data) == 64 + (24 if flags & NORMALS_FOLLOW else 12) * n and scale == 0
     positions = np.frombuffer(data, "<f4", 3 * n, 64).reshape(n, 3)
-    return Frame(sequence, tick, sim_time, pose_time, flags, confidence, positions)
+    return Frame(sequence, tick, sim_time, pose_time, flags, confidence, generation, positions)
 
 
 def read_wrench(data):
     assert len(data) == 192
     v = WRENCH.unpack(data)
     assert v[:3] == (b"PLWR", 1, 192)
-    return Wrench(*v[3:8], force=np.array(v[8:11]), torque=np.array(v[11:14]), flags=v[24], n_contacts=v[25])
+    return Wrench(*v[3:8], force=np.array(v[8:11]), torque=np.array(v[11:14]), flags=v[24], n_contacts=v[25],
+                  confidence=v[26])
 
 
 def wait_until(condition, what, timeout_s=TIMEOUT_S):

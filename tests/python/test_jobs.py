@@ -49,9 +49,9 @@ def small(tmp_path_factory):
 
 
 @contextlib.contextmanager
-def running(plicad, scene, log, **options):
+def running(plicad, scene, log, options=(), **others):
     """A daemon whose jobs get as much of a busy machine as anybody."""
-    daemon = Daemon(plicad, scene, log, options=["--job-priority", "normal"], **options)
+    daemon = Daemon(plicad, scene, log, options=["--job-priority", "normal", *options], **others)
     try:
         daemon.wait()
         yield daemon

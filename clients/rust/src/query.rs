@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use plica_protocol::chunk::ChunkHeader;
 use plica_protocol::keys::check_name;
-use plica_protocol::rpc::{ErrorReply, StepPose, StepReply, StepRequest};
+use plica_protocol::rpc::{ActivateReply, ActivateRequest, ErrorReply, Method, StepPose, StepReply, StepRequest};
 use plica_protocol::status::Status;
 use plica_protocol::{DecodeError, ENCODING_JSON};
 use serde::Serialize;
@@ -20,6 +20,8 @@ use crate::{Client, ClientError, SkinMessage};
 
 /// Zenoh reports its own time-out as an error reply; this much later nothing comes any more.
 const GRACE: Duration = Duration::from_millis(500);
+/// How long examples may take to be made ready.
+const ACTIVATE_TIMEOUT: Duration = Duration::from_secs(60);
 /// Refuses a length that no mesh or snapshot has.
 const MAX_WHOLE_BYTES: u64 = 1 << 31;
 
@@ -45,7 +47,8 @@ impl Client {
 
     /// Calls a method with typed arguments and a typed reply (see `protocol::rpc`).
     pub fn call<Q: Serialize, R: DeserializeOwned>(&self, method: &str, request: &Q) -> Result<R, ClientError> {
-        self.call_within(method, request, self.timeout)
+        let is_slow = method == Method::Activate.name();
+        self.call_within(method, request, if is_slow { ACTIVATE_TIMEOUT.max(self.timeout) } else { self.timeout })
     }
 
     pub(crate) fn call_within<Q: Serialize, R: DeserializeOwned>(
@@ -64,6 +67,12 @@ impl Client {
     /// Lock-step: applies the poses, then runs the ticks. The daemon must be paused.
     pub fn step(&self, ticks: u32, poses: Vec<StepPose>) -> Result<StepReply, ClientError> {
         self.call("step", &StepRequest { ticks, poses })
+    }
+
+    /// Enriches with other examples: `database` is the id of a job that is done, or a path on the daemon's machine. Takes
+    /// seconds, during which the simulation goes on with what it has.
+    pub fn activate(&self, database: &str) -> Result<ActivateReply, ClientError> {
+        self.call(Method::Activate.name(), &ActivateRequest { database: database.to_owned() })
     }
 
     /// The mesh of an object as GLB: fetched in pieces, its SHA-256 checked.

@@ -29,7 +29,7 @@ pub struct Cli {
 pub enum Command {
     /// Runs a scene in real time and serves it on the bus until Ctrl-C.
     Serve(ServeArgs),
-    /// Serves on loopback, drives the tool through a real client, prints a summary, writes a picture and a GLB.
+    /// Trains a few examples, serves on loopback, drives the tool through a real client, prints a summary, writes pictures.
     Demo(DemoArgs),
     /// Runs a scene along recorded poses, without bus or clock; the same input gives the same bytes.
     Simulate(SimulateArgs),
@@ -88,6 +88,9 @@ pub struct ServeArgs {
     /// Ticks only when rpc/step says so.
     #[arg(long)]
     pub lock_step: bool,
+    /// Examples to enrich the skin with, in place of those that the scene names.
+    #[arg(long, value_name = "FILE")]
+    pub database: Option<PathBuf>,
     /// Folder for jobs and their results; one daemon at a time uses it.
     #[arg(long, value_name = "DIR", help = DATA_HELP)]
     pub data: Option<PathBuf>,
@@ -127,6 +130,9 @@ pub struct SimulateArgs {
     /// Result, a safetensors file.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
+    /// Examples to enrich the skin with, in place of those that the scene names.
+    #[arg(long, value_name = "FILE")]
+    pub database: Option<PathBuf>,
     /// One frame every so many ticks.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub every: u64,
@@ -149,6 +155,9 @@ pub struct BenchArgs {
     /// Element in place of the scene's.
     #[arg(long)]
     pub element: Option<Element>,
+    /// Examples to enrich the skin with, in place of those that the scene names.
+    #[arg(long, value_name = "FILE")]
+    pub database: Option<PathBuf>,
 }
 
 /// Elements by name.
@@ -285,7 +294,10 @@ pub struct DemoArgs {
     /// Maps the trajectory's box into the room above the object.
     #[arg(long, requires = "poses")]
     pub fit: bool,
-    /// Folder for picture and GLB.
+    /// Folder for pictures, GLB, and the examples that the first run trains.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
+    /// How many examples the first run trains.
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    pub examples: u32,
 }

@@ -70,7 +70,7 @@ impl FramesFile {
         }
         self.time_s.extend(frame.sim_time_s.to_le_bytes());
         self.tick.extend(frame.tick.to_le_bytes());
-        self.confidence.extend(0.0_f32.to_le_bytes());
+        self.confidence.extend(frame.confidence.to_le_bytes());
         for tool in tools {
             self.force.extend(tool.force_n.iter().flat_map(|x| x.to_le_bytes()));
             let (position, orientation) = position_and_xyzw(&tool.proxy);

@@ -9,6 +9,7 @@ pub mod cli;
 pub mod commands;
 pub mod config;
 pub mod demo;
+pub mod enrichment;
 pub mod frames_file;
 pub mod jobs;
 pub mod limits;

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use plica_sim::enrichment::LiveEnrichment;
 use plica_sim::{Model, TickReport};
 
 use crate::motion::TimedPose;
@@ -21,6 +22,11 @@ impl Replay {
     pub fn new(model: Arc<Model>, poses: Vec<TimedPose>) -> Self {
         let (core, ports) = Loop::new(model, LoopOptions { publish_hz: 1000.0, wrench_hz: 1000.0, lock_step: false });
         Self { core, ports, poses, next: 0 }
+    }
+
+    /// Enriches the skin from now on.
+    pub fn enrich(&mut self, live: Box<LiveEnrichment>) {
+        self.core.enrich(live);
     }
 
     /// Takes one tick: the poses whose time has come arrive first.

@@ -7,6 +7,7 @@ use plica_sim::Model;
 
 use crate::bus::{Bus, BusError, BusOptions, Parts, Scene};
 use crate::config::Config;
+use crate::enrichment::{Enrichment, EnrichmentError};
 use crate::jobs::{DataFolderError, Jobs, Supervision};
 use crate::limits::{FrameTooLarge, check_frame};
 use crate::realtime::{Grants, Loop, LoopOptions, Running, ThreadOptions, spawn};
@@ -27,6 +28,9 @@ pub enum ServerError {
     /// The simulation thread cannot be started.
     #[error("the simulation thread cannot be started: {0}")]
     Thread(#[from] std::io::Error),
+    /// The examples that it should start with cannot be used.
+    #[error(transparent)]
+    Enrichment(#[from] EnrichmentError),
     /// Another daemon has the data folder.
     #[error(transparent)]
     Data(#[from] DataFolderError),
@@ -41,7 +45,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Builds the scene, opens the bus and starts ticking (in lock-step: waits for `rpc/step`). Without jobs.
+    /// Builds the scene, reads the examples that it names, opens the bus and starts ticking (in lock-step: waits for `rpc/step`). Without jobs.
     pub fn start(config: &Config, options: &BusOptions, lock_step: bool) -> Result<Self, ServerError> {
         Self::start_with_jobs(config, options, lock_step, || Ok((Jobs::unavailable("it was started without"), None)))
     }
@@ -60,10 +64,23 @@ impl Server {
         check_frame(config, model.n_skin())?;
         let publish = config.object().publish();
         let loop_options = LoopOptions { publish_hz: publish.publish_hz, wrench_hz: publish.wrench_hz, lock_step };
-        let (core, ports) = Loop::new(Arc::clone(&model), loop_options);
+        let (mut core, ports) = Loop::new(Arc::clone(&model), loop_options);
+        let enrichment = Enrichment::new(config, &model).map_err(EnrichmentError::from)?;
+        if let Some(database) = &config.enrichment().database {
+            core.enrich(enrichment.live(&enrichment.read(database)?));
+        }
         let simulation = spawn(core, thread_options(config))?;
         let grants = simulation.grants().clone();
-        let parts = Parts { session, keys, scene: describe(config), model: Arc::clone(&model), ports, grants, jobs };
+        let parts = Parts {
+            session,
+            keys,
+            scene: describe(config),
+            model: Arc::clone(&model),
+            enrichment,
+            ports,
+            grants,
+            jobs,
+        };
         Ok(Self { bus: Bus::start(parts)?, simulation, model, supervision })
     }
 

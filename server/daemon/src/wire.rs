@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use plica_protocol::jobs::{Job, JobKind, Progress};
 use plica_protocol::pose::Pose;
-use plica_protocol::rpc::{ErrorCode, ErrorReply, SnapshotReply, StateReply, StepReply};
+use plica_protocol::rpc::{ActivateReply, ErrorCode, ErrorReply, SnapshotReply, StateReply, StepReply};
 use plica_protocol::skin::{SkinFlags, SkinHeader};
 use plica_protocol::status::{Distribution, ObjectStatus, Realtime, Scheduling, SolverStatus, ToolStatus};
 use plica_protocol::wrench::{Wrench, WrenchFlags};
@@ -41,7 +41,14 @@ pub fn skin_header(frame: &Frame, sequence: u64) -> SkinHeader {
         tick: frame.tick,
         sim_time_s: frame.sim_time_s,
         newest_pose_source_time_ns: frame.newest_pose_source_time_ns,
-        flags: SkinFlags { degraded: frame.degraded, sleeping: frame.sleeping, ..SkinFlags::default() },
+        flags: SkinFlags {
+            enriched: frame.confidence > 0.0,
+            degraded: frame.degraded,
+            sleeping: frame.sleeping,
+            ..SkinFlags::default()
+        },
+        confidence: frame.confidence,
+        database_generation: frame.database_generation,
         ..SkinHeader::default()
     }
 }
@@ -63,7 +70,7 @@ pub fn wrench(frame: &ToolFrame, sequence: u64) -> Wrench {
         proxy_orientation_xyzw,
         flags: wrench_flags(r),
         n_contacts: r.n_contacts,
-        confidence: 0.0,
+        confidence: frame.confidence,
     }
 }
 
@@ -105,6 +112,8 @@ pub fn object_status(reading: &Reading) -> ObjectStatus {
     ObjectStatus {
         sleeping: reading.report.sleeping,
         rollbacks: reading.rollbacks,
+        enriched: reading.confidence.is_some(),
+        confidence: reading.confidence.map(f64::from),
         max_penetration_m: reading.max_penetration_m.into(),
         solver: SolverStatus { iterations: reading.report.iterations.into(), fallbacks: reading.fallbacks },
         ..ObjectStatus::default()
@@ -134,6 +143,15 @@ pub fn step_reply(outcome: &Outcome) -> StepReply {
 /// Reply of `snapshot`.
 pub fn snapshot_reply(outcome: &Outcome) -> SnapshotReply {
     SnapshotReply { id: outcome.snapshot.unwrap_or_default().to_string() }
+}
+
+/// Reply of `activate`.
+pub fn activate_reply(outcome: &Outcome, n_examples: usize) -> ActivateReply {
+    ActivateReply {
+        tick: outcome.tick,
+        database_generation: outcome.database_generation,
+        examples: u32::try_from(n_examples).unwrap_or(u32::MAX),
+    }
 }
 
 /// What a job makes.

@@ -13,11 +13,14 @@ pub enum Stage {
     Embedding,
     /// The two non-finite gates and the copy kept for roll-back.
     Gates,
+    /// Contacts followed, and detail added to the skin where somebody wants it: after the tick, by who hands it out.
+    Enrichment,
 }
 
 impl Stage {
     /// All stages in the order in which a tick first enters them.
-    pub const ALL: [Stage; 5] = [Stage::Poses, Stage::Contact, Stage::Solve, Stage::Embedding, Stage::Gates];
+    pub const ALL: [Stage; 6] =
+        [Stage::Poses, Stage::Contact, Stage::Solve, Stage::Embedding, Stage::Gates, Stage::Enrichment];
 
     /// Name in status messages and benchmark output.
     pub fn name(self) -> &'static str {
@@ -27,6 +30,7 @@ impl Stage {
             Stage::Solve => "solve",
             Stage::Embedding => "embedding",
             Stage::Gates => "gates",
+            Stage::Enrichment => "enrichment",
         }
     }
 }

@@ -3,6 +3,7 @@
 //! Callbacks run on Zenoh's receiving threads: they decode, store and return, and no panic leaves them. Streams are
 //! published, and questions answered, by threads of their own, so that a frozen client can hold up a reply but no tick.
 
+mod activate;
 mod counters;
 mod guard;
 mod intake;
@@ -28,6 +29,7 @@ use plica_sim::Model;
 use zenoh::{Session, Wait};
 
 use crate::config::PublishConfig;
+use crate::enrichment::Enrichment;
 use crate::jobs::Jobs;
 use crate::realtime::{Grants, Ports};
 
@@ -100,6 +102,8 @@ pub struct Parts {
     pub scene: Scene,
     /// The scene's model.
     pub model: Arc<Model>,
+    /// What makes examples ready.
+    pub enrichment: Enrichment,
     /// The simulation thread's other ends.
     pub ports: Ports,
     /// What the simulation thread was granted.
@@ -131,6 +135,7 @@ struct Shared {
     keys: Keys,
     scene: Scene,
     model: Arc<Model>,
+    enrichment: Enrichment,
     intake: Arc<PoseIntake>,
     counters: Arc<SharedCounters>,
     jobs: Jobs,
@@ -146,7 +151,7 @@ impl Bus {
 
     /// Declares every key and starts the threads.
     pub fn start(parts: Parts) -> Result<Self, BusError> {
-        let Parts { session, keys, scene, model, ports, grants, jobs } = parts;
+        let Parts { session, keys, scene, model, enrichment, ports, grants, jobs } = parts;
         let Ports { poses, commands, frames, wrenches, readings, statistics } = ports;
         let counters = Arc::new(SharedCounters::default());
         let intake = Arc::new(PoseIntake::new(&scene, poses));
@@ -156,6 +161,7 @@ impl Bus {
             keys,
             scene,
             model,
+            enrichment,
             intake,
             counters,
             jobs,
@@ -169,14 +175,15 @@ impl Bus {
         let sources = status::Sources { readings, statistics, grants, published };
         let (status_queries, status_thread) = status::start(&shared, sources, replies.clone())?;
         let (job_requests, job_thread) = jobs::start(&shared, replies.clone())?;
-        let (rpc_queries, rpc_thread) = rpc::start(&shared, commands, replies.clone(), job_requests)?;
+        let (rpc_queries, rpc_threads) = rpc::start(&shared, commands, replies.clone(), job_requests)?;
         let mesh_queries = mesh::declare(&shared, replies)?;
         let declared = Declared {
             _poses: poses::declare(&shared)?,
             _queryables: vec![skin_queries, status_queries, rpc_queries, mesh_queries],
             _alive: alive(&shared)?,
         };
-        let threads = vec![reply_thread, skin_thread, wrench_thread, status_thread, rpc_thread, job_thread];
+        let mut threads = vec![reply_thread, skin_thread, wrench_thread, status_thread, job_thread];
+        threads.extend(rpc_threads);
         let wake = threads.iter().map(|t| t.thread().clone()).collect();
         Ok(Self { session, stop, threads, wake, _declared: declared })
     }

@@ -1,4 +1,5 @@
-//! Methods of the simulation: one at a time, on a thread of their own. Those about jobs are handed to another thread.
+//! Methods of the simulation: one at a time, on a thread of their own. Those about jobs, and what takes seconds to prepare, are
+//! handed to other threads.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
@@ -13,6 +14,7 @@ use serde::Serialize;
 use zenoh::Wait;
 use zenoh::query::{Query, Queryable};
 
+use super::activate::{self, Activation};
 use super::guard::guarded;
 use super::replies::{Content, Replies};
 use super::{BusError, Shared, spawn};
@@ -25,36 +27,60 @@ const QUEUE: usize = 16;
 const PATIENCE: Duration = Duration::from_secs(10);
 const LOOK_AT_STOP: Duration = Duration::from_millis(100);
 
+/// What waits for the simulation.
+pub(super) enum Request {
+    /// A question as it came.
+    Ask(Query),
+    /// Examples that are ready.
+    Activate(Box<Activation>),
+}
+
+impl Request {
+    pub(super) fn into_query(self) -> Query {
+        match self {
+            Self::Ask(query) => query,
+            Self::Activate(activation) => activation.query,
+        }
+    }
+}
+
 pub(super) fn start(
     shared: &Arc<Shared>,
     port: CommandPort,
     replies: Replies,
     job_requests: SyncSender<Query>,
-) -> Result<(Queryable<()>, JoinHandle<()>), BusError> {
+) -> Result<(Queryable<()>, [JoinHandle<()>; 2]), BusError> {
     let (requests_in, requests) = sync_channel(QUEUE);
+    let (activate_in, activate_thread) = activate::start(shared, requests_in.clone(), replies.clone())?;
     let (busy, keys) = (replies.clone(), shared.keys.clone());
     let callback = guarded(&shared.counters, move |query: Query| {
-        let about_jobs = keys.method_of_rpc(query.key_expr().as_str()).is_some_and(is_about_jobs);
-        let queue = if about_jobs { &job_requests } else { &requests_in };
-        if let Err(TrySendError::Full(query) | TrySendError::Disconnected(query)) = queue.try_send(query) {
+        let method = keys.method_of_rpc(query.key_expr().as_str()).and_then(|name| Method::parse(name).ok());
+        let refused = match method {
+            Some(Method::Activate) => activate_in.try_send(query).err().map(refused),
+            Some(method) if method.is_about_jobs() => job_requests.try_send(query).err().map(refused),
+            _ => requests_in.try_send(Request::Ask(query)).err().map(|error| refused(error).into_query()),
+        };
+        if let Some(query) = refused {
             busy.send(query, Err(ErrorReply::new(ErrorCode::Busy, "too many requests are waiting")));
         }
     });
     let queryable = shared.session.declare_queryable(shared.keys.rpc("*")).callback(callback);
     let queryable = queryable.wait().map_err(|e| shared.error(e))?;
     let worker = Worker { shared: Arc::clone(shared), port, replies, requests, outstanding: 0 };
-    Ok((queryable, spawn("plica-rpc", move || worker.run())?))
+    Ok((queryable, [activate_thread, spawn("plica-rpc", move || worker.run())?]))
 }
 
-fn is_about_jobs(name: &str) -> bool {
-    Method::parse(name).is_ok_and(Method::is_about_jobs)
+/// What did not fit into a queue.
+pub(super) fn refused<T>(error: TrySendError<T>) -> T {
+    let (TrySendError::Full(item) | TrySendError::Disconnected(item)) = error;
+    item
 }
 
 struct Worker {
     shared: Arc<Shared>,
     port: CommandPort,
     replies: Replies,
-    requests: Receiver<Query>,
+    requests: Receiver<Request>,
     /// Orders whose answer nobody waits for any more.
     outstanding: u32,
 }
@@ -64,7 +90,8 @@ impl Worker {
         self.port.answered.register_current();
         while !self.shared.stopping() {
             match self.requests.recv_timeout(LOOK_AT_STOP) {
-                Ok(query) => self.serve(query),
+                Ok(Request::Ask(query)) => self.serve(query),
+                Ok(Request::Activate(activation)) => self.activate(*activation),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return,
             }
@@ -75,6 +102,13 @@ impl Worker {
         let key = query.key_expr().as_str().to_owned();
         let content = self.answer(&key, &query).map(|json| Content::json(key, json));
         self.replies.send(query, content);
+    }
+
+    fn activate(&mut self, activation: Activation) {
+        let Activation { query, live, n_examples } = activation;
+        let key = query.key_expr().as_str().to_owned();
+        let content = self.order(Command::Activate(live)).and_then(|o| json(&wire::activate_reply(&o, n_examples)));
+        self.replies.send(query, content.map(|json| Content::json(key, json)));
     }
 
     fn answer(&mut self, key: &str, query: &Query) -> Result<String, ErrorReply> {
@@ -95,7 +129,7 @@ impl Worker {
             Method::Pause => plain(Command::Pause)?,
             Method::Resume => plain(Command::Resume)?,
             Method::Snapshot => plain(Command::Snapshot)?,
-            _ => return Err(ErrorReply::new(ErrorCode::Internal, "a request about jobs went astray")),
+            _ => return Err(ErrorReply::new(ErrorCode::Internal, "a request to another thread went astray")),
         };
         let outcome = self.order(command)?;
         match method {

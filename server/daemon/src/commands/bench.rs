@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use crate::cli::{BenchArgs, Element};
 use crate::config::{BenchConfig, Config};
+use crate::enrichment::{self, Enrichment, Ready};
 use crate::motion::TimedPose;
 use crate::realtime::StageTimer;
 use crate::replay::Replay;
@@ -63,7 +64,7 @@ pub struct Spread {
 
 /// Times a scene and prints the result.
 pub fn run(args: &BenchArgs, json: bool) -> anyhow::Result<()> {
-    let mut config = super::scene(&args.scene)?;
+    let mut config = super::scene_with(&args.scene, &args.database)?;
     if let Some(element) = args.element {
         config.set_element(match element {
             Element::EnhancedStrain => ElementKind::EnhancedStrain,
@@ -87,28 +88,35 @@ pub fn run(args: &BenchArgs, json: bool) -> anyhow::Result<()> {
 /// Times `n_ticks` ticks of a scene, starting its motion anew each time it is through.
 pub fn bench(config: &Config, motion: &BenchConfig, n_ticks: u64) -> anyhow::Result<Report> {
     let model = Arc::new(scene::build(config)?);
+    let enrichment = enrichment::at_start(config, &model)?;
+    let scene = Scene { config, model: &model, motion, enrichment: enrichment.as_ref() };
     let mut timings = Timings::new(n_ticks);
     let per_pass = 1 + (motion.duration_s() / model.timestep_s()).round() as u64;
     let mut full_press = None;
     // One pass is not counted: it brings tables and branch predictors up to temperature.
     let mut warm = Timings::new(per_pass);
-    run_pass(&model, config, motion, &mut warm, per_pass, &mut full_press);
+    run_pass(&scene, &mut warm, per_pass, &mut full_press);
     while (timings.total_ns.len() as u64) < n_ticks {
         let left = n_ticks - timings.total_ns.len() as u64;
-        run_pass(&model, config, motion, &mut timings, per_pass.min(left), &mut full_press);
+        run_pass(&scene, &mut timings, per_pass.min(left), &mut full_press);
     }
-    Ok(timings.report(config, &model, full_press))
+    Ok(timings.report(&scene, full_press))
 }
 
-fn run_pass(
-    model: &Arc<Model>,
-    config: &Config,
-    motion: &BenchConfig,
-    timings: &mut Timings,
-    n_ticks: u64,
-    full_press: &mut Option<[f64; 3]>,
-) {
-    let mut replay = Replay::new(Arc::clone(model), poses(model, config, motion, n_ticks));
+/// What is timed.
+struct Scene<'a> {
+    config: &'a Config,
+    model: &'a Arc<Model>,
+    motion: &'a BenchConfig,
+    enrichment: Option<&'a (Enrichment, Ready)>,
+}
+
+fn run_pass(scene: &Scene<'_>, timings: &mut Timings, n_ticks: u64, full_press: &mut Option<[f64; 3]>) {
+    let Scene { model, motion, .. } = *scene;
+    let mut replay = Replay::new(Arc::clone(model), poses(model, scene.config, motion, n_ticks));
+    if let Some((enrichment, ready)) = scene.enrichment {
+        replay.enrich(enrichment.live(ready));
+    }
     replay.ports().frames.listening.store(true, Relaxed);
     let mut timer = StageTimer::new();
     for _ in 0..n_ticks {
@@ -176,14 +184,17 @@ impl Timings {
         self.max_penetration_m = self.max_penetration_m.max(report.max_penetration_m);
     }
 
-    fn report(self, config: &Config, model: &Model, full_press_force_n: Option<[f64; 3]>) -> Report {
+    fn report(self, scene: &Scene<'_>, full_press_force_n: Option<[f64; 3]>) -> Report {
+        let Scene { config, model, enrichment, .. } = *scene;
         let ticks = self.total_ns.len() as u64;
         let mean_iterations = self.iterations as f64 / ticks as f64;
         let (bytes, flops) = work(model, mean_iterations, self.passes as f64 / ticks as f64);
         let roofline = Roofline::measure(table_bytes(model));
         let limit_us = 1e6 * roofline.limit_s(bytes, flops);
         let tick_us = spread(self.total_ns);
-        let stages = Stage::ALL.iter().zip(self.stages_ns).map(|(s, ns)| (s.name().to_owned(), spread(ns)));
+        let stages = Stage::ALL.iter().zip(self.stages_ns);
+        let stages = stages.filter(|(s, _)| **s != Stage::Enrichment || enrichment.is_some());
+        let stages = stages.map(|(s, ns)| (s.name().to_owned(), spread(ns)));
         let stages = stages.chain([(HAND_OVER.to_owned(), spread(self.hand_over_ns))]).collect();
         Report {
             scene: config.name().to_owned(),
@@ -213,7 +224,7 @@ pub fn table_bytes(model: &Model) -> usize {
 }
 
 /// Bytes and operations of a tick: every iteration multiplies by the stiffness and applies the preconditioner once, every
-/// pass evaluates one residual more; the skin is embedded once. Contact rows are left out: they are small.
+/// pass evaluates one residual more; the skin is embedded once. Enrichment and contact rows are left out.
 pub fn work(model: &Model, iterations: f64, passes: f64) -> (f64, f64) {
     let cost = model.cost();
     let products = iterations + passes;

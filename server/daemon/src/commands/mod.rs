@@ -12,7 +12,7 @@ pub mod simulate;
 pub mod solve;
 pub mod train;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::cli::{Cli, Command};
 use crate::config::{Config, ConfigError};
@@ -40,4 +40,13 @@ fn scene(path: &Path) -> Result<Config, ConfigError> {
         return Config::built_in();
     }
     Config::from_file(path)
+}
+
+/// The same, with other examples to start with.
+fn scene_with(path: &Path, database: &Option<PathBuf>) -> Result<Config, ConfigError> {
+    let mut config = scene(path)?;
+    if let Some(file) = database {
+        config.set_database(file.clone());
+    }
+    Ok(config)
 }

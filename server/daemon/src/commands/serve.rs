@@ -18,7 +18,10 @@ const LOOK_AROUND: Duration = Duration::from_millis(100);
 pub fn run(args: &ServeArgs, json: bool) -> anyhow::Result<()> {
     // Registered first, so that a signal during the start is not lost.
     let mut signals = Signals::new([SIGINT, SIGTERM]).context("cannot listen for signals")?;
-    let (config, text) = read(args)?;
+    let (mut config, text) = read(args)?;
+    if let Some(file) = &args.database {
+        config.set_database(file.clone());
+    }
     let options = args.bus.options();
     let server = Server::start_with_jobs(&config, &options, args.lock_step, || open_jobs(args, &config, text))?;
     for warning in &server.grants().warnings {

@@ -8,6 +8,7 @@ use plica_sim::NoProbe;
 
 use crate::cli::SimulateArgs;
 use crate::config::Config;
+use crate::enrichment;
 use crate::frames_file::{FramesFile, Shape};
 use crate::motion::{self, TimedPose};
 use crate::replay::Replay;
@@ -18,7 +19,7 @@ const MAX_OUTPUT_BYTES: f64 = 1e12;
 
 /// Runs a scene along recorded poses and writes what came of it.
 pub fn run(args: &SimulateArgs, json: bool) -> anyhow::Result<()> {
-    let config = super::scene(&args.scene)?;
+    let config = super::scene_with(&args.scene, &args.database)?;
     let (poses, fit) = motion::read(&args.poses, &config, args.tool.as_deref(), args.fit)?;
     if let Some(fit) = fit {
         tracing::info!("fitted by scale {:.4}, {:?} m to {:?} m", fit.scale, fit.from_m, fit.to_m);
@@ -53,8 +54,12 @@ fn simulate(config: &Config, poses: Vec<TimedPose>, args: &SimulateArgs) -> anyh
         bytes / 1e9,
         args.poses.display()
     );
+    let enrichment = enrichment::at_start(config, &model)?;
     let mut file = FramesFile::create(&args.out, shape).with_context(|| args.out.display().to_string())?;
     let mut replay = Replay::new(model, poses);
+    if let Some((enrichment, ready)) = &enrichment {
+        replay.enrich(enrichment.live(ready));
+    }
     let progress = bar(n_ticks)?;
     let (mut ticks_in_contact, mut peak_force_n) = (0, 0.0_f64);
     for tick in 1..=n_ticks {

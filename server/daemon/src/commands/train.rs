@@ -13,7 +13,9 @@ use plica_training::{Folder, Job, JobKind, Report, write_atomically};
 use crate::cli::{TrainArgs, TrainKind};
 use crate::config::Config;
 use crate::training::{JobRequest, make, setup};
-use watch::{Ending, OnTerminal, ToLog};
+use watch::{Ending, ToLog};
+
+pub(super) use watch::OnTerminal;
 
 /// Exit code of a job that was asked to stop, and did: what is finished is kept.
 pub const INTERRUPTED: u8 = 75;
@@ -51,7 +53,7 @@ fn run_scene(config: &Config, args: &TrainArgs, n_threads: u32, json: bool) -> a
     let request = JobRequest { kind, examples: args.examples, seed: args.seed, threads: n_threads };
     let (folder, job) = make(&root, config, &request)?;
     let begun = standing::begin(&root)?;
-    let watch = OnTerminal::new(ending);
+    let watch = OnTerminal::new(Some(ending));
     let result = work(config, &job, &folder, n_threads as usize, &watch);
     watch.finish();
     // The result counts, even if the note about it cannot be written.
@@ -86,8 +88,8 @@ fn run_job(root: &Path, threads: Option<u32>, json: bool) -> anyhow::Result<()> 
     Ok(())
 }
 
-/// The one code path of both.
-fn work(
+/// The one code path of all.
+pub(super) fn work(
     config: &Config,
     job: &Job,
     folder: &Folder,

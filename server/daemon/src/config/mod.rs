@@ -4,6 +4,7 @@ mod accurate;
 mod bench;
 pub(crate) mod checks;
 mod document;
+mod enrichment;
 mod error;
 mod files;
 mod obj;
@@ -20,6 +21,7 @@ use plica_sim::{ContactOptions, Plane, SleepOptions, ToolDescription};
 pub use accurate::AccurateConfig;
 pub use bench::{BenchConfig, Keyframe};
 pub use document::Document;
+pub use enrichment::EnrichmentConfig;
 pub use error::ConfigError;
 pub use files::SceneFile;
 pub use object::{Face, FixedConfig, MeshConfig, ObjectConfig, PositionFormat, PublishConfig, Region, SkinConfig};
@@ -43,6 +45,7 @@ pub struct Config {
     runtime: RuntimeConfig,
     bench: Option<BenchConfig>,
     training: TrainingConfig,
+    enrichment: EnrichmentConfig,
     files: Vec<SceneFile>,
     text: String,
 }
@@ -73,13 +76,15 @@ impl Config {
         let object = object::check(&check, &raw.objects)?;
         let tools = tool::check(&check, &raw.tools)?;
         let bench = raw.bench.as_ref().map(|b| bench::check(&check, b, &tools)).transpose()?;
+        let training = check_training(&check, &raw, &tools)?;
         Ok(Self {
             name: file.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned()),
             file: file.to_owned(),
             object,
             contact: runtime::check_contact(&check, &raw.contact)?,
             runtime: runtime::check(&check, &raw.runtime)?,
-            training: check_training(&check, &raw, &tools)?,
+            enrichment: check_enrichment(&check, &raw, &training)?,
+            training,
             files: files::list(&check, &raw),
             text: text.to_owned(),
             tools,
@@ -137,7 +142,17 @@ impl Config {
         &self.training
     }
 
-    /// Files that the scene names.
+    /// How examples become detail on the skin.
+    pub fn enrichment(&self) -> &EnrichmentConfig {
+        &self.enrichment
+    }
+
+    /// Names the examples to start with, in place of those that the scene names.
+    pub fn set_database(&mut self, file: PathBuf) {
+        self.enrichment.database = Some(file);
+    }
+
+    /// Files that belong to the scene, and go with it into a job's folder.
     pub fn files(&self) -> &[SceneFile] {
         &self.files
     }
@@ -161,6 +176,15 @@ impl Config {
 fn check_training(c: &Check<'_>, raw: &RawConfig, tools: &[ToolDescription]) -> Result<TrainingConfig, ConfigError> {
     let (name, object) = raw.objects.first_key_value().expect("the object was checked before");
     training::check(c, &format!("objects.{name}.training"), &object.training, tools)
+}
+
+fn check_enrichment(
+    c: &Check<'_>,
+    raw: &RawConfig,
+    training: &TrainingConfig,
+) -> Result<EnrichmentConfig, ConfigError> {
+    let (name, object) = raw.objects.first_key_value().expect("the object was checked before");
+    enrichment::check(c, &format!("objects.{name}.enrichment"), &object.enrichment, training.stamp_axes)
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 #![allow(rustdoc::broken_intra_doc_links, reason = "units in brackets; the schema shows this text as it is")]
 
+mod enrichment;
 mod training;
 
 use std::collections::BTreeMap;
@@ -9,6 +10,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+pub(crate) use enrichment::*;
 pub(crate) use training::*;
 
 /// A scene: one soft object, the tools that touch it, and how it runs.
@@ -63,6 +65,9 @@ pub struct RawObject {
     /// What `plicad train` does.
     #[serde(default)]
     pub training: RawTraining,
+    /// How examples become detail on the skin.
+    #[serde(default)]
+    pub enrichment: RawEnrichment,
 }
 
 /// Shape of an object, made by a generator.

@@ -42,6 +42,26 @@ fn the_built_in_scene_writes_the_defaults() {
     assert_eq!(bare.runtime().realtime_priority(), config.runtime().realtime_priority());
 }
 
+/// Enrichment says the same, whether it is written out or left out, and each way of it has a name.
+#[test]
+fn enrichment_reads() {
+    use plica_sim::enrichment::{Coordinates, Correlator, EnrichmentOptions, Interpolator};
+    let read = |from: &str, to: &str| {
+        assert!(BUILT_IN_SCENE.contains(from), "{from}");
+        Config::parse(Path::new("scenes/wedge.toml"), &BUILT_IN_SCENE.replacen(from, to, 1)).unwrap().enrichment
+    };
+    let own = Config::built_in().unwrap().enrichment;
+    assert_eq!(own, EnrichmentConfig { options: EnrichmentOptions::default(), database: None });
+    let changed = read("method = \"kriging\"", "method = \"ssh12\"").options;
+    assert!(matches!(changed.correlator, Correlator::Ssh12(_)) && !changed.field.control_variate);
+    let changed = read("interpolation = \"stamp\"", "interpolation = \"warp\"").options;
+    assert_eq!(changed.field.interpolator, Interpolator::Warp);
+    let changed = read("coordinates = \"exponential\"", "coordinates = \"orthogonal\"").options;
+    assert_eq!(changed.coordinates, Coordinates::Orthogonal);
+    let named = read("# database = ", "database = ").database;
+    assert_eq!(named.as_deref(), Some(Path::new("scenes/wedge.safetensors")));
+}
+
 #[test]
 fn the_peer_wedge_reads() {
     let text = include_str!("../../../../configs/scenes/peer-wedge.toml");
@@ -99,6 +119,15 @@ fn every_bad_file_gives_one_clear_message() {
             &["drag_share", "remove"],
         ),
         ("candidates_per_example = 2", "candidates_per_example = 1", &["candidates_per_example", "2 to 1000"]),
+        (
+            "method = \"kriging\"",
+            "method = \"krigging\"",
+            &["enrichment.method", "unknown variant `krigging`", "`ssh12`"],
+        ),
+        ("texels = 32", "texels = 1000", &["enrichment.texels", "8 to 256"]),
+        ("modes = 32", "modes = 0", &["enrichment.modes", "1 to 100000"]),
+        ("radius_cells = 7.0", "radius_cells = 0.1", &["enrichment.radius_cells", "0.5 to 64"]),
+        ("fade = true", "fading = true", &["enrichment.fading", "unknown field `fading`", "fade"]),
     ];
     for (from, to, fragments) in cases {
         let (message, line) = message_and_line(from, to);

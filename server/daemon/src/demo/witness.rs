@@ -20,6 +20,8 @@ const WRENCHES: usize = 8192;
 pub(super) struct Seen {
     pub(super) frames: u64,
     pub(super) frames_missed: u64,
+    /// Frames with detail.
+    pub(super) frames_enriched: u64,
     pub(super) wrenches: u64,
     pub(super) peak_force_n: f64,
     pub(super) peak_displacement_m: f32,
@@ -27,6 +29,7 @@ pub(super) struct Seen {
     pub(super) deepest: Vec<[f32; 3]>,
     pub(super) deepest_sim_time_s: f64,
     deepest_tick: u64,
+    pub(super) confidence_then: f32,
     pub(super) proxy: Option<Isometry3<f64>>,
     pub(super) force_then_n: f64,
     /// Proxies and forces by tick, newest last.
@@ -91,6 +94,11 @@ impl Seen {
         self.motion_to_force_us
     }
 
+    /// Positions at the deepest press; at rest if there was none \[m\].
+    pub(super) fn deepest_or<'a>(&'a self, surface: &'a Surface) -> &'a [[f32; 3]] {
+        if self.deepest.is_empty() { &surface.rest } else { &self.deepest }
+    }
+
     fn note_wrench(&mut self, message: &WrenchMessage) {
         let w = &message.wrench;
         let force_n = Vector3::from(w.force_n).norm();
@@ -109,12 +117,14 @@ impl Seen {
 
     fn note_frame(&mut self, message: &SkinMessage, rest: &[[f32; 3]]) {
         let Some(positions) = message.frame().ok().and_then(|f| f.positions_m(rest)) else { return };
+        self.frames_enriched += u64::from(message.header.flags.enriched);
         let squared = |(p, r): (&[f32; 3], &[f32; 3])| (0..3).map(|i| (p[i] - r[i]).powi(2)).sum::<f32>();
         let largest = positions.iter().zip(rest).map(squared).fold(0.0, f32::max).sqrt();
         if largest > self.peak_displacement_m {
             self.peak_displacement_m = largest;
             self.deepest = positions;
             self.deepest_tick = message.header.tick;
+            self.confidence_then = message.header.confidence;
             self.deepest_sim_time_s = message.header.sim_time_s;
             self.match_proxy();
         }

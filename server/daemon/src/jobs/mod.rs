@@ -17,6 +17,7 @@ mod store;
 mod submit;
 mod supervisor;
 
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -24,7 +25,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use plica_protocol::chunk::ChunkHeader;
 use plica_protocol::jobs::{
-    Job, JobFetchRequest, JobListReply, JobState, JobStatus, JobSubmitReply, JobSubmitRequest, MAX_IN_STATUS,
+    Job, JobFetchRequest, JobFile, JobListReply, JobState, JobStatus, JobSubmitReply, JobSubmitRequest, MAX_IN_STATUS,
 };
 use plica_protocol::rpc::ErrorReply;
 
@@ -130,14 +131,19 @@ impl Jobs {
 
     /// A piece of a result.
     pub fn piece(&self, request: &JobFetchRequest, offset: u64) -> Result<(ChunkHeader, Vec<u8>), ErrorReply> {
-        let (shared, file) = (self.shared()?, request.file);
-        let unknown = || JobError::Unknown(request.id.clone());
-        let entry = shared.store.entry(shared.store.find(&request.id)?).ok_or_else(unknown)?;
+        let path = self.result(&request.id, request.file)?;
+        self.shared()?.sums.piece(&path, offset)
+    }
+
+    /// Where a result of a job that is done lies.
+    pub fn result(&self, id: &str, file: JobFile) -> Result<PathBuf, JobError> {
+        let store = &self.shared()?.store;
+        let entry = store.entry(store.find(id)?).ok_or_else(|| JobError::Unknown(id.to_owned()))?;
         let state = entry.standing.state;
         if state != JobState::Done {
-            return Err(JobError::NotDone { id: request.id.clone(), state, file }.into());
+            return Err(JobError::NotDone { id: id.to_owned(), state, file });
         }
-        shared.sums.piece(&entry.folder.result(file), offset)
+        Ok(entry.folder.result(file))
     }
 
     /// Jobs that have changed since a version (0: ever), and the version now.

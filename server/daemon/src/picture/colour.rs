@@ -9,6 +9,8 @@ pub(super) const INK: Linear = [0.016, 0.019, 0.026];
 pub(super) const SOFT_INK: Linear = [0.075, 0.085, 0.105];
 /// Tools.
 pub(super) const STEEL: Linear = [0.16, 0.27, 0.42];
+/// Lines of three versions of a skin in one section; the last is the one that the others are measured against.
+pub(super) const VERSIONS: [Linear; 3] = [[0.05, 0.20, 0.52], [0.80, 0.10, 0.02], INK];
 /// The inside of a section.
 pub(super) const CUT: Linear = [0.58, 0.36, 0.31];
 

@@ -4,6 +4,7 @@
 mod camera;
 mod canvas;
 mod colour;
+mod contrast;
 mod creased;
 mod font;
 mod panel;
@@ -17,6 +18,7 @@ use plica_sim::ToolShape;
 use crate::surface::Surface;
 use camera::Camera;
 use canvas::{Canvas, Rect};
+pub use contrast::{Contrast, Version, draw_contrast};
 use panel::{Panel, draw_panel};
 
 /// Width of the picture \[pixels\].
@@ -48,8 +50,8 @@ struct Look<'a> {
     subject: &'a Subject<'a>,
     /// Normals of each triangle's corners, not smoothed over the edges of the outline.
     normals: Vec<[[f32; 3]; 3]>,
-    /// Length of each vertex's displacement \[m\].
-    displacement: Vec<f32>,
+    /// Length that each vertex's colour shows \[m\].
+    lengths: Vec<f32>,
     /// Where the colour scale ends \[m\].
     scale_end_m: f32,
     /// Edges of the rest shape where it turns sharply.
@@ -99,16 +101,16 @@ fn caption(picture: &mut Canvas, look: &Look<'_>) {
     picture.text(40, 66, 2, &look.subject.subtitle.to_uppercase(), colour::SOFT_INK);
     picture.text(1084, 62, 2, "SECTION THROUGH THE CONTACT", colour::SOFT_INK);
     picture.text(1084, 492, 2, "FROM ABOVE", colour::SOFT_INK);
-    legend(picture, look.scale_end_m);
+    legend(picture, 40, "DISPLACEMENT (MM)   GRID 10 MM   LINES: REST SHAPE", look.scale_end_m);
 }
 
 /// A bar of the colour scale with five marks in millimetres.
-fn legend(picture: &mut Canvas, end_m: f32) {
-    let (x, y, w, h) = (40, 838, 420, 18);
+fn legend(picture: &mut Canvas, x: u32, title: &str, end_m: f32) {
+    let (y, w, h) = (838, 420, 18);
     for i in 0..w {
         picture.fill(Rect { x: x + i, y, w: 1, h }, colour::scale(i as f32 / (w - 1) as f32));
     }
-    picture.text(x, y - 24, 2, "DISPLACEMENT (MM)   GRID 10 MM   LINES: REST SHAPE", colour::SOFT_INK);
+    picture.text(x, y - 24, 2, title, colour::SOFT_INK);
     for mark in 0..=4 {
         let share = mark as f32 / 4.0;
         let at = x + (share * (w - 1) as f32) as u32;
@@ -119,23 +121,39 @@ fn legend(picture: &mut Canvas, end_m: f32) {
 }
 
 impl<'a> Look<'a> {
+    /// Coloured by displacement.
     fn new(subject: &'a Subject<'a>) -> Self {
+        let lengths = distances(subject.positions, &subject.surface.rest);
+        let scale_end_m = scale_end(&lengths);
+        Self::coloured(subject, lengths, scale_end_m)
+    }
+
+    /// Coloured by lengths, on a scale up to `scale_end_m`.
+    fn coloured(subject: &'a Subject<'a>, lengths: Vec<f32>, scale_end_m: f32) -> Self {
         let surface = subject.surface;
-        let distance = |(p, r): (&[f32; 3], &[f32; 3])| (0..3).map(|i| (p[i] - r[i]).powi(2)).sum::<f32>().sqrt();
-        let displacement: Vec<f32> = subject.positions.iter().zip(&surface.rest).map(distance).collect();
-        let largest = displacement.iter().copied().fold(0.0, f32::max);
         let points = surface.rest.iter().map(|p| Point3::from(*p).cast::<f64>());
         let bounds =
             points.fold([Point3::from([f64::MAX; 3]), Point3::from([f64::MIN; 3])], |[a, b], p| [a.inf(&p), b.sup(&p)]);
         Self {
             subject,
             normals: creased::corner_normals(surface, subject.positions),
-            displacement,
-            scale_end_m: round_up(largest.max(1e-4)),
+            lengths,
+            scale_end_m,
             outline: creased::sharp_edges(surface),
             bounds,
         }
     }
+}
+
+/// Distance of each point of one skin from the same point of another \[m\].
+fn distances(a: &[[f32; 3]], b: &[[f32; 3]]) -> Vec<f32> {
+    let distance = |(p, q): (&[f32; 3], &[f32; 3])| (0..3).map(|i| (p[i] - q[i]).powi(2)).sum::<f32>().sqrt();
+    a.iter().zip(b).map(distance).collect()
+}
+
+/// Where a scale ends that shows all of them.
+fn scale_end(lengths: &[f32]) -> f32 {
+    round_up(lengths.iter().copied().fold(1e-4, f32::max))
 }
 
 /// The next of 1, 1.2, 1.6, 2, 2.4, 3.2, 4, 6, 8 times a power of ten: quarters of it are short numbers.

@@ -38,12 +38,12 @@ pub(super) fn draw_panel(canvas: &mut Canvas, look: &Look<'_>, panel: &Panel) {
 }
 
 fn draw_skin(canvas: &mut Canvas, look: &Look<'_>, panel: &Panel) {
-    let Look { subject, normals, displacement, scale_end_m, .. } = look;
+    let Look { subject, normals, lengths, scale_end_m, .. } = look;
     for (t, corner_normals) in subject.surface.triangles.iter().zip(normals) {
         let corner = |k: usize| {
             let v = t[k] as usize;
             let (p, n, r) = (subject.positions[v], corner_normals[k], subject.surface.rest[v]);
-            let attributes = [p[0], p[1], p[2], n[0], n[1], n[2], r[0], r[1], r[2], displacement[v] / scale_end_m];
+            let attributes = [p[0], p[1], p[2], n[0], n[1], n[2], r[0], r[1], r[2], lengths[v] / scale_end_m];
             Corner { position: point(p), attributes }
         };
         triangle(canvas, &panel.rect, &panel.camera, [0, 1, 2].map(corner), |canvas, f| {
@@ -56,7 +56,7 @@ fn draw_skin(canvas: &mut Canvas, look: &Look<'_>, panel: &Panel) {
     }
 }
 
-/// The displacement scale under a light, with a grid that moves with the skin; the inside of a section is flat.
+/// The colour scale under a light, with a grid that moves with the skin; the inside of a section is flat.
 fn skin_colour(camera: &Camera, f: &Fragment<10>) -> Linear {
     let [px, py, pz, nx, ny, nz, rx, ry, rz, share] = f.attributes;
     let normal = vector([nx, ny, nz]).normalize();

@@ -1,6 +1,7 @@
 //! What the simulation thread can be asked to do, and what it answers.
 
 use plica_sim::ToolPose;
+use plica_sim::enrichment::LiveEnrichment;
 
 /// An order, obeyed between ticks.
 #[derive(Debug)]
@@ -25,6 +26,8 @@ pub enum Command {
         /// Number of the snapshot.
         id: u64,
     },
+    /// Enriches with other examples from now on. What did so before travels back in the reply.
+    Activate(Box<LiveEnrichment>),
 }
 
 /// Where the simulation stands after an order.
@@ -38,6 +41,8 @@ pub struct Outcome {
     pub paused: bool,
     /// Number of the snapshot that was taken.
     pub snapshot: Option<u64>,
+    /// Counts activations of examples; 0 is the plain coarse skin.
+    pub database_generation: u32,
 }
 
 /// Why an order was not obeyed.
@@ -58,6 +63,17 @@ pub enum Refusal {
 pub struct Reply {
     /// What came of it.
     pub outcome: Result<Outcome, Refusal>,
-    /// The vector of a [`Command::Step`], on its way back.
-    pub returned: Vec<ToolPose>,
+    /// What came with the order or was replaced by it, to be freed by the asker.
+    pub returned: Returned,
+}
+
+/// Memory on its way back from the simulation thread.
+#[derive(Debug)]
+pub enum Returned {
+    /// There is none.
+    Nothing,
+    /// The vector of a [`Command::Step`].
+    Poses(Vec<ToolPose>),
+    /// What a [`Command::Activate`] has replaced.
+    Enrichment(Option<Box<LiveEnrichment>>),
 }

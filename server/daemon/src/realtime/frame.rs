@@ -15,6 +15,10 @@ pub struct Frame {
     pub degraded: bool,
     /// Whether the object is at rest and this is a repeat.
     pub sleeping: bool,
+    /// Least confidence over the tools that touch; 0 is the plain coarse skin.
+    pub confidence: f32,
+    /// Counts activations of examples; 0: none is active.
+    pub database_generation: u32,
     /// World positions `[n_skin]` \[m\].
     pub positions: Vec<[f32; 3]>,
     /// Counts frames that are due for publishing; a frame made for a question alone keeps the number.
@@ -32,6 +36,8 @@ pub struct ToolFrame {
     pub sim_time_s: f64,
     /// The tool.
     pub reading: ToolReading,
+    /// Of the enrichment at this tool, when a frame was last made.
+    pub confidence: f32,
 }
 
 /// Where the simulation stands, for the status.
@@ -51,6 +57,8 @@ pub struct Reading {
     pub max_penetration_m: f32,
     /// Ticks since reset that repeated a solve with block Jacobi.
     pub fallbacks: u64,
+    /// Least confidence over the tools that touch; `None` while no examples are active.
+    pub confidence: Option<f32>,
     /// All tools, `[n_tools]`.
     pub tools: Vec<ToolReading>,
 }

@@ -5,6 +5,7 @@
 
 mod cadence;
 mod command;
+mod detail;
 mod frame;
 mod histogram;
 mod outbox;
@@ -18,7 +19,7 @@ mod thread;
 mod turn;
 mod waker;
 
-pub use command::{Command, Outcome, Refusal, Reply};
+pub use command::{Command, Outcome, Refusal, Reply, Returned};
 pub use frame::{Frame, Reading, ToolFrame};
 pub use histogram::{AtomicHistogram, Summary};
 pub use pacing::{MAX_CATCH_UP, Pacer, Plan};

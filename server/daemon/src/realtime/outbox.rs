@@ -3,11 +3,12 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 
-use plica_sim::{Model, State, TickReport};
+use plica_sim::{Model, NoProbe, State, TickReport};
 use triple_buffer::Input;
 
 use super::cadence::Cadence;
-use super::{Frame, Reading, Statistics, ToolFrame, Waker};
+use super::detail::Detail;
+use super::{Frame, Reading, Statistics, ToolFrame, TurnProbe, Waker};
 
 /// How often the frame of a sleeping object is repeated.
 const SLEEPING_HZ: f64 = 2.0;
@@ -56,19 +57,33 @@ impl Cadences {
     }
 }
 
+/// Where the simulation stands.
+#[derive(Clone, Copy)]
+pub(super) struct Present<'a> {
+    pub(super) model: &'a Model,
+    pub(super) state: &'a State,
+    pub(super) report: &'a TickReport,
+}
+
 impl Outbox {
     /// After a tick.
-    pub(super) fn hand_out(&mut self, model: &Model, state: &State, report: &TickReport, statistics: &Statistics) {
-        self.note(report);
-        self.hand_out_wrenches(state, statistics);
-        self.hand_out_frame(model, state, report.sleeping);
-        self.hand_out_reading(state, report, false);
+    pub(super) fn hand_out(
+        &mut self,
+        present: Present<'_>,
+        detail: &mut Detail,
+        statistics: &Statistics,
+        probe: &mut impl TurnProbe,
+    ) {
+        self.note(present.report);
+        self.hand_out_wrenches(present.state, detail, statistics);
+        self.hand_out_frame(present, detail, probe);
+        self.hand_out_reading(present, detail, false);
     }
 
     /// Without a tick: answers questions, keeps the status true.
-    pub(super) fn hand_out_still(&mut self, model: &Model, state: &State, report: &TickReport) {
-        self.answer(model, state, report.sleeping, false);
-        self.hand_out_reading(state, report, true);
+    pub(super) fn hand_out_still(&mut self, present: Present<'_>, detail: &mut Detail) {
+        self.answer(present, detail, false, &mut NoProbe);
+        self.hand_out_reading(present, detail, true);
     }
 
     /// After a reset.
@@ -84,16 +99,21 @@ impl Outbox {
         self.fallbacks += u64::from(report.fallbacks > 0);
     }
 
-    fn hand_out_wrenches(&mut self, state: &State, statistics: &Statistics) {
+    fn hand_out_wrenches(&mut self, state: &State, detail: &Detail, statistics: &Statistics) {
         if !self.cadences.wrench.advance() {
             return;
         }
         let mut any = false;
-        for (outlet, reading) in self.wrenches.iter_mut().zip(state.tools()) {
+        for (tool, (outlet, reading)) in self.wrenches.iter_mut().zip(state.tools()).enumerate() {
             if !reading.present || !outlet.listening.load(Relaxed) {
                 continue;
             }
-            let frame = ToolFrame { tick: state.tick(), sim_time_s: state.sim_time_s(), reading: *reading };
+            let frame = ToolFrame {
+                tick: state.tick(),
+                sim_time_s: state.sim_time_s(),
+                reading: *reading,
+                confidence: detail.confidence(tool),
+            };
             let refused = outlet.queue.push(frame).is_err();
             statistics.wrench_drops.fetch_add(u64::from(refused), Relaxed);
             any = true;
@@ -103,16 +123,18 @@ impl Outbox {
         }
     }
 
-    fn hand_out_frame(&mut self, model: &Model, state: &State, sleeping: bool) {
+    fn hand_out_frame(&mut self, present: Present<'_>, detail: &mut Detail, probe: &mut impl TurnProbe) {
+        let sleeping = present.report.sleeping;
         let falls_asleep = sleeping && !self.was_sleeping;
         self.was_sleeping = sleeping;
         let cadence = if sleeping { &mut self.cadences.sleeping_skin } else { &mut self.cadences.skin };
         let due = (cadence.advance() || falls_asleep) && self.listening.load(Relaxed);
-        self.answer(model, state, sleeping, due);
+        self.answer(present, detail, due, probe);
     }
 
     /// Writes a frame if it is due or was asked for.
-    fn answer(&mut self, model: &Model, state: &State, sleeping: bool, due: bool) {
+    fn answer(&mut self, present: Present<'_>, detail: &mut Detail, due: bool, probe: &mut impl TurnProbe) {
+        let Present { model, state, report } = present;
         let questions = self.questions.load(Relaxed);
         if !due && questions == self.answered {
             return;
@@ -124,17 +146,20 @@ impl Outbox {
         frame.sim_time_s = state.sim_time_s();
         frame.newest_pose_source_time_ns = state.tools().iter().map(|t| t.pose_source_time_ns).max().unwrap_or(0);
         frame.degraded = self.degraded;
-        frame.sleeping = sleeping;
+        frame.sleeping = report.sleeping;
         frame.due = self.due;
         frame.answers = questions;
-        state.write_skin(model, &mut frame.positions);
+        detail.write_skin(model, state, &mut frame.positions, probe);
+        frame.confidence = detail.least_confidence().unwrap_or(0.0);
+        frame.database_generation = detail.generation();
         self.degraded &= !due;
         self.frames.publish();
         self.skin_waker.wake();
     }
 
     /// What the status says.
-    pub(super) fn hand_out_reading(&mut self, state: &State, report: &TickReport, paused: bool) {
+    pub(super) fn hand_out_reading(&mut self, present: Present<'_>, detail: &Detail, paused: bool) {
+        let Present { state, report, .. } = present;
         let reading = self.readings.input_buffer_mut();
         reading.tick = state.tick();
         reading.sim_time_s = state.sim_time_s();
@@ -143,6 +168,7 @@ impl Outbox {
         reading.report = *report;
         reading.max_penetration_m = self.max_penetration_m;
         reading.fallbacks = self.fallbacks;
+        reading.confidence = detail.least_confidence();
         reading.tools.copy_from_slice(state.tools());
         self.readings.publish();
     }

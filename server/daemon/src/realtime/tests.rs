@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
 use nalgebra::Isometry3;
+use plica_sim::enrichment::{Enricher, EnrichmentOptions, Examples, LiveEnrichment, Touch};
 use plica_sim::{NoProbe, PoseSample, ToolPose};
 
 use super::*;
@@ -182,6 +183,87 @@ fn reset_returns_to_rest_and_forgets_waiting_poses() {
     assert_eq!(positions(&mut core, &mut ports), rest);
     order(&mut core, &mut ports, Command::Step { ticks: 1, poses: Vec::new() }).unwrap();
     assert!(!core.state().tools()[0].present);
+}
+
+/// A detail of 1 mm downwards wherever the ball presses the middle.
+fn live(model: &Arc<plica_sim::Model>) -> Box<LiveEnrichment> {
+    let description = model.description();
+    let touch = |depth: f64| Touch {
+        contact_point: nalgebra::Point3::new(0.02, 0.02, 0.02),
+        tool_origin: nalgebra::Point3::new(0.02, 0.02, 0.026 - depth),
+    };
+    let pressed = |depth: f64| {
+        let dent = move |p: &nalgebra::Point3<f64>| {
+            let off_squared = (p.x - 0.02).powi(2) + (p.y - 0.02).powi(2);
+            [0.0, 0.0, -(depth * (-off_squared / 1e-4).exp() * p.z / 0.02) as f32]
+        };
+        let nodes = description.mesh.nodes().iter().map(dent).collect();
+        let detail = description.skin.positions().iter().map(|p| dent(p).map(|x| 0.5 * x)).collect();
+        (nodes, detail)
+    };
+    let depths = [0.001, 0.002, 0.003];
+    let (displacements, details) = depths.iter().map(|d| pressed(*d)).unzip();
+    let examples = Examples { displacements, details, touches: depths.map(touch).to_vec() };
+    let options = EnrichmentOptions { fade: false, ..EnrichmentOptions::default() };
+    Box::new(LiveEnrichment::new(model, Arc::new(Enricher::new(model, &examples, options).unwrap())))
+}
+
+#[test]
+fn activating_changes_the_skin_and_nothing_else() {
+    let (mut core, mut ports) = start(true);
+    let press = |sequence, z| vec![ToolPose { tool: 0, sample: sample(sequence, z) }];
+    order(&mut core, &mut ports, Command::Step { ticks: 100, poses: press(1, 0.024) }).unwrap();
+    let coarse = positions(&mut core, &mut ports);
+    assert_eq!(ports.frames.frames.output_buffer().database_generation, 0);
+    let own = order(&mut core, &mut ports, Command::Step { ticks: 0, poses: Vec::new() }).unwrap();
+    let activated = live(core.model());
+    let outcome = order(&mut core, &mut ports, Command::Activate(activated)).unwrap();
+    assert_eq!(outcome, Outcome { database_generation: 1, ..own });
+    // Standing still, and after the next tick.
+    let enriched = positions(&mut core, &mut ports);
+    let frame = ports.frames.frames.output_buffer();
+    assert!(frame.database_generation == 1 && frame.confidence > 0.0, "{} confident", frame.confidence);
+    let moved = enriched.iter().zip(&coarse).map(|(a, b)| (a[2] - b[2]).abs()).fold(0.0, f32::max);
+    assert!(moved > 1e-5, "detail of {moved} m");
+    assert_eq!(core.state().tick(), 100);
+    ports.wrenches[0].listening.store(true, Relaxed);
+    order(&mut core, &mut ports, Command::Step { ticks: 2, poses: press(2, 0.024) }).unwrap();
+    assert!(ports.wrenches[0].wrenches.pop().unwrap().confidence > 0.0);
+    assert!(ports.readings.read().confidence.unwrap() > 0.0);
+}
+
+#[test]
+fn what_was_active_comes_back_to_the_asker() {
+    let (mut core, mut ports) = start(true);
+    let mut activate = || {
+        let live = live(core.model());
+        ports.commands.orders.push(Command::Activate(live)).unwrap();
+        core.turn(&mut NoProbe);
+        ports.commands.replies.pop().unwrap()
+    };
+    assert!(matches!(activate().returned, Returned::Enrichment(None)));
+    let second = activate();
+    assert_eq!(second.outcome.unwrap().database_generation, 2);
+    assert!(matches!(second.returned, Returned::Enrichment(Some(_))));
+}
+
+#[test]
+fn a_restored_state_is_enriched_as_it_was_and_a_reset_one_is_at_rest() {
+    let (mut core, mut ports) = start(true);
+    let rest = positions(&mut core, &mut ports);
+    let activated = live(core.model());
+    order(&mut core, &mut ports, Command::Activate(activated)).unwrap();
+    let press = |sequence, z| vec![ToolPose { tool: 0, sample: sample(sequence, z) }];
+    order(&mut core, &mut ports, Command::Step { ticks: 100, poses: press(1, 0.024) }).unwrap();
+    let id = order(&mut core, &mut ports, Command::Snapshot).unwrap().snapshot.unwrap();
+    let kept = positions(&mut core, &mut ports);
+    order(&mut core, &mut ports, Command::Step { ticks: 50, poses: press(2, 0.05) }).unwrap();
+    assert_ne!(positions(&mut core, &mut ports), kept);
+    order(&mut core, &mut ports, Command::Restore { id }).unwrap();
+    assert_eq!(positions(&mut core, &mut ports), kept);
+    assert_eq!(order(&mut core, &mut ports, Command::Reset).unwrap().database_generation, 1);
+    assert_eq!(positions(&mut core, &mut ports), rest);
+    assert_eq!(ports.frames.frames.output_buffer().confidence, 0.0);
 }
 
 #[test]

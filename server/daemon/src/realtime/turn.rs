@@ -3,14 +3,16 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
+use plica_sim::enrichment::LiveEnrichment;
 use plica_sim::{Model, PoseSample, State, TickInput, TickReport, ToolPose, Workspace};
 use triple_buffer::triple_buffer;
 
-use super::outbox::{Cadences, Outbox, ToolOutlet};
+use super::detail::Detail;
+use super::outbox::{Cadences, Outbox, Present, ToolOutlet};
 use super::snapshots::Snapshots;
 use super::{
-    Command, CommandPort, Frame, FramePort, Outcome, Ports, Reading, Refusal, Reply, Statistics, TurnProbe, Waker,
-    WrenchPort,
+    Command, CommandPort, Frame, FramePort, Outcome, Ports, Reading, Refusal, Reply, Returned, Statistics, TurnProbe,
+    Waker, WrenchPort,
 };
 
 /// Poses per tool that may wait for a tick.
@@ -60,6 +62,7 @@ pub struct Loop {
     answered: Arc<Waker>,
     simulation: Arc<Waker>,
     snapshots: Snapshots,
+    detail: Detail,
     outbox: Outbox,
     statistics: Arc<Statistics>,
     lock_step: bool,
@@ -98,6 +101,7 @@ impl Loop {
             replies,
             answered,
             simulation,
+            detail: Detail::default(),
             outbox,
             statistics,
             lock_step: options.lock_step,
@@ -119,9 +123,14 @@ impl Loop {
         }
         self.take_poses();
         self.tick(probe);
-        self.hand_out();
+        self.hand_out(probe);
         self.count_step();
         Turn::Ticked(self.report)
+    }
+
+    /// Enriches from now on, before it runs on a thread of its own; then [`Command::Activate`] does.
+    pub fn enrich(&mut self, live: Box<LiveEnrichment>) {
+        self.detail.activate(live, &self.model, &self.state);
     }
 
     /// The immutable part of the scene.
@@ -171,7 +180,8 @@ impl Loop {
         if !self.lock_step {
             self.trim_poses();
         }
-        self.outbox.hand_out_still(&self.model, &self.state, &self.report);
+        let present = Present { model: &self.model, state: &self.state, report: &self.report };
+        self.outbox.hand_out_still(present, &mut self.detail);
         Turn::Still
     }
 
@@ -197,17 +207,19 @@ impl Loop {
         let input = TickInput { clock_s: self.state.sim_time_s(), poses: &self.poses };
         self.report = plica_sim::tick(&self.model, input, &mut self.state, &mut self.workspace, probe);
         probe.leave();
+        self.detail.follow(&self.model, &self.state, probe);
     }
 
-    fn hand_out(&mut self) {
-        self.outbox.hand_out(&self.model, &self.state, &self.report, &self.statistics);
+    fn hand_out(&mut self, probe: &mut impl TurnProbe) {
+        let present = Present { model: &self.model, state: &self.state, report: &self.report };
+        self.outbox.hand_out(present, &mut self.detail, &self.statistics, probe);
     }
 
     fn count_step(&mut self) {
         if self.steps_left == 1 {
             // Moved, not freed: the vector goes back with the reply.
             let used = std::mem::take(&mut self.step_poses);
-            self.reply(Ok(None), used);
+            self.reply(Ok(None), Returned::Poses(used));
         }
         self.steps_left = self.steps_left.saturating_sub(1);
     }
@@ -222,37 +234,47 @@ impl Loop {
         match order {
             Command::Pause => {
                 self.paused = true;
-                self.reply(Ok(None), Vec::new());
+                self.reply(Ok(None), Returned::Nothing);
             }
-            Command::Resume if self.lock_step => self.reply(Err(Refusal::LockStep), Vec::new()),
+            Command::Resume if self.lock_step => self.reply(Err(Refusal::LockStep), Returned::Nothing),
             Command::Resume => {
                 self.paused = false;
-                self.reply(Ok(None), Vec::new());
+                self.reply(Ok(None), Returned::Nothing);
             }
-            Command::Step { poses, .. } if !self.paused => self.reply(Err(Refusal::NotPaused), poses),
-            Command::Step { poses, .. } if self.steps_left > 0 => self.reply(Err(Refusal::Busy), poses),
-            Command::Step { ticks: 0, poses } => self.reply(Ok(None), poses),
+            Command::Step { poses, .. } if !self.paused => self.reply(Err(Refusal::NotPaused), Returned::Poses(poses)),
+            Command::Step { poses, .. } if self.steps_left > 0 => {
+                self.reply(Err(Refusal::Busy), Returned::Poses(poses))
+            }
+            Command::Step { ticks: 0, poses } => self.reply(Ok(None), Returned::Poses(poses)),
             Command::Step { ticks, poses } => {
                 self.steps_left = ticks;
                 self.step_poses = poses;
             }
             Command::Snapshot => {
                 let id = self.snapshots.keep(&self.state);
-                self.reply(Ok(Some(id)), Vec::new());
+                self.reply(Ok(Some(id)), Returned::Nothing);
             }
             Command::Reset => {
                 self.restart();
-                self.reply(Ok(None), Vec::new());
+                self.reply(Ok(None), Returned::Nothing);
             }
             Command::Restore { id } => {
-                let found = self.snapshots.find(id).map(|kept| self.state.copy_from(kept));
-                self.reply(found.map(|()| None).ok_or(Refusal::UnknownSnapshot), Vec::new());
+                let found = self.snapshots.find(id).map(|kept| {
+                    self.state.copy_from(kept);
+                    self.detail.begin_anew(&self.model, &self.state);
+                });
+                self.reply(found.map(|()| None).ok_or(Refusal::UnknownSnapshot), Returned::Nothing);
+            }
+            Command::Activate(live) => {
+                let retired = self.detail.activate(live, &self.model, &self.state);
+                self.reply(Ok(None), Returned::Enrichment(retired));
             }
         }
     }
 
     fn restart(&mut self) {
         self.state.copy_from(&self.rest);
+        self.detail.begin_anew(&self.model, &self.state);
         self.outbox.forget();
         self.report = TickReport::default();
         for queue in &mut self.pose_queues {
@@ -261,13 +283,15 @@ impl Loop {
     }
 
     /// The status is true before the answer is heard.
-    fn reply(&mut self, result: Result<Option<u64>, Refusal>, returned: Vec<ToolPose>) {
-        self.outbox.hand_out_reading(&self.state, &self.report, self.paused);
+    fn reply(&mut self, result: Result<Option<u64>, Refusal>, returned: Returned) {
+        let present = Present { model: &self.model, state: &self.state, report: &self.report };
+        self.outbox.hand_out_reading(present, &self.detail, self.paused);
         let outcome = result.map(|snapshot| Outcome {
             tick: self.state.tick(),
             sim_time_s: self.state.sim_time_s(),
             paused: self.paused,
             snapshot,
+            database_generation: self.detail.generation(),
         });
         // The asker keeps as many orders under way as there is room for answers.
         let _ = self.replies.push(Reply { outcome, returned });

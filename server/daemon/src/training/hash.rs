@@ -3,8 +3,8 @@
 //! Canonical JSON of the checked scene: the object with its materials and supports, gravity, coarse mesh and element, skin
 //! and embedding, accurate model, tie, friction, and the tools' shapes; of mesh files their bytes. Not in it: what is
 //! published, how it runs (but for gravity, which deforms both models), how the linear solver gets to its result, how tools
-//! follow their devices, and what training draws. Numbers are those that were typed; nothing computed from them is hashed,
-//! since a last digit may differ between machines.
+//! follow their devices, what training draws, and how examples are used. Numbers are those that were typed; nothing
+//! computed from them is hashed, since a last digit may differ between machines.
 
 use std::path::PathBuf;
 
@@ -181,6 +181,8 @@ mod tests {
             ("seed = 1\n", "seed = 11\n"),
             ("max_contacts = 32", "max_contacts = 64"),
             ("full_press_s = 0.5", "full_press_s = 0.4"),
+            ("method = \"kriging\"", "method = \"ridge\""),
+            ("radius_cells = 7.0", "radius_cells = 5.0"),
         ];
         for (from, to) in changes {
             assert_eq!(with(from, to), own, "{from} -> {to}");

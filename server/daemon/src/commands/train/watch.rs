@@ -14,7 +14,7 @@ const LOG_INTERVAL: Duration = Duration::from_secs(30);
 
 /// Set once somebody asks the process to end.
 #[derive(Debug, Clone)]
-pub(super) struct Ending(Arc<AtomicBool>);
+pub(in crate::commands) struct Ending(Arc<AtomicBool>);
 
 impl Ending {
     pub(super) fn listen() -> std::io::Result<Self> {
@@ -32,20 +32,21 @@ impl Ending {
 
 /// A progress bar.
 #[derive(Debug)]
-pub(super) struct OnTerminal {
-    ending: Ending,
+pub(in crate::commands) struct OnTerminal {
+    /// Without one, signals end the process as they do by themselves.
+    ending: Option<Ending>,
     bar: ProgressBar,
 }
 
 impl OnTerminal {
-    pub(super) fn new(ending: Ending) -> Self {
+    pub(in crate::commands) fn new(ending: Option<Ending>) -> Self {
         let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {msg}").expect("the template is fixed");
         let bar = ProgressBar::new(1).with_style(style).with_message("builds the models");
         bar.enable_steady_tick(Duration::from_millis(500));
         Self { ending, bar }
     }
 
-    pub(super) fn finish(&self) {
+    pub(in crate::commands) fn finish(&self) {
         self.bar.finish_and_clear();
     }
 }
@@ -58,7 +59,7 @@ impl Watch for OnTerminal {
     }
 
     fn cancelled(&self) -> bool {
-        self.ending.is_asked()
+        self.ending.as_ref().is_some_and(Ending::is_asked)
     }
 }
 

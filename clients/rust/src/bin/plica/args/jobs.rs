@@ -19,6 +19,8 @@ pub(crate) enum Jobs {
     Resume(Resume),
     /// Get the result of a job that is done, with its SHA-256 checked.
     Fetch(Fetch),
+    /// Enrich the daemon's skin with the examples of a job that is done, without a dropped frame.
+    Activate(Id),
 }
 
 #[derive(Debug, clap::Args)]

@@ -28,7 +28,19 @@ pub(crate) fn run(client: &Client, jobs: &Jobs, output: Output) -> anyhow::Resul
         }
         Jobs::Resume(resume) => self::resume(client, resume, output),
         Jobs::Fetch(fetch) => fetch::run(client, fetch, output),
+        Jobs::Activate(which) => activate(client, &which.id, output),
     }
+}
+
+fn activate(client: &Client, id: &str, output: Output) -> anyhow::Result<ExitCode> {
+    let reply = client.activate(id)?;
+    let (examples, generation) = (reply.examples, reply.database_generation);
+    let text = format!(
+        "{examples} examples of job {id} enrich the skin from tick {} on, as generation {generation}",
+        reply.tick
+    );
+    output.result(&json!(reply), &text);
+    Ok(ExitCode::SUCCESS)
 }
 
 fn submit(client: &Client, submit: &Submit, output: Output) -> anyhow::Result<ExitCode> {

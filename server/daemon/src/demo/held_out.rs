@@ -1,0 +1,125 @@
+//! A press that was never trained on, solved by the accurate model, for comparison.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use anyhow::Context;
+use nalgebra::{Isometry3, Point3, Vector3};
+use plica_geometry::ReferenceSkin;
+use plica_sim::{Model, State};
+use plica_training::{Example, Interaction, Outcome, Setup, Tandem, plan};
+use serde::Serialize;
+
+use super::isometry;
+use crate::config::Config;
+use crate::enrichment::{Enrichment, touch};
+use crate::{scene, training};
+
+/// The deepest of so many held-out presses is shown.
+const N_CANDIDATES: usize = 8;
+
+/// One press, three skins.
+#[derive(Debug, Clone)]
+pub(super) struct HeldOut {
+    pub(super) coarse: Vec<[f32; 3]>,
+    pub(super) enriched: Vec<[f32; 3]>,
+    pub(super) accurate: Vec<[f32; 3]>,
+    pub(super) tool: usize,
+    pub(super) tool_pose: Isometry3<f64>,
+    /// Where the skin is touched, deformed \[m\].
+    pub(super) focus: Point3<f64>,
+    pub(super) depth_m: f64,
+    pub(super) errors: Errors,
+}
+
+/// How far the skins are from the accurate one.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Errors {
+    /// The plain coarse skin.
+    pub coarse: Distance,
+    /// With detail.
+    pub enriched: Distance,
+    /// What enrichment thinks of itself, 0 to 1.
+    pub confidence: f32,
+}
+
+/// Over all of a skin.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Distance {
+    /// Weighted by area \[m\].
+    pub rms_m: f64,
+    /// At the worst vertex \[m\].
+    pub worst_m: f64,
+}
+
+/// Solves the press and enriches it with a database.
+pub(super) fn held_out(config: &Config, database: &Path) -> anyhow::Result<HeldOut> {
+    let setup = training::setup(config)?;
+    let interaction = deepest(&setup)?;
+    let example = solve(&setup, &interaction)?;
+    let model = Arc::new(scene::build(config)?);
+    let enrichment = Enrichment::new(config, &model)?;
+    let enricher = enrichment.read(database)?.enricher;
+
+    let mut state = State::new(&model);
+    let nodes: Vec<_> = example.displacements.iter().map(|d| Vector3::from(d.map(f64::from))).collect();
+    state.set_node_displacements(&model, &nodes);
+    let mut offsets = vec![[0.0; 4]; model.n_skin()];
+    state.write_padded_offsets(&model, &mut offsets);
+    let mut detail = vec![[0.0; 4]; model.n_skin()];
+    let touch = touch(&example);
+    let confidence = enricher.evaluate(&model, &state, &offsets, &touch, &mut enricher.scratch(), &mut detail);
+
+    let mut coarse = vec![[0.0; 3]; model.n_skin()];
+    state.write_skin(&model, &mut coarse);
+    let added = |p: &[f32; 3], d: [f32; 3]| [p[0] + d[0], p[1] + d[1], p[2] + d[2]];
+    let enriched: Vec<_> = coarse.iter().zip(&detail).map(|(p, d)| added(p, [d[0], d[1], d[2]])).collect();
+    let accurate: Vec<_> = coarse.iter().zip(&example.detail).map(|(p, d)| added(p, *d)).collect();
+    let errors = Errors {
+        coarse: distance(&model, &coarse, &accurate),
+        enriched: distance(&model, &enriched, &accurate),
+        confidence,
+    };
+    let [x, y, z, q @ ..] = example.tool_pose;
+    Ok(HeldOut {
+        focus: lowest_near(&accurate, &touch.tool_origin),
+        tool: interaction.tool as usize,
+        tool_pose: isometry([x, y, z], q),
+        depth_m: interaction.depth_m(),
+        coarse,
+        enriched,
+        accurate,
+        errors,
+    })
+}
+
+/// Among the first of the interactions that an evaluation of the scene holds out.
+fn deepest(setup: &Setup) -> anyhow::Result<Interaction> {
+    let mut in_region = setup.evaluation.first().context("the scene has no held-out interactions")?.clone();
+    in_region.count = N_CANDIDATES;
+    let all = plan(setup, &[in_region], setup.evaluation_seed)?;
+    all.into_iter().max_by(|a, b| a.depth_m().total_cmp(&b.depth_m())).context("no held-out interaction")
+}
+
+fn solve(setup: &Setup, interaction: &Interaction) -> anyhow::Result<Example> {
+    match Tandem::new(setup)?.solve(0, interaction, false, &|| false) {
+        Ok(Outcome::Accepted(example)) => Ok(*example),
+        Ok(Outcome::Rejected(rejection)) => anyhow::bail!("the held-out press is rejected: {}", rejection.message),
+        Err(_) => anyhow::bail!("the held-out press was interrupted"),
+    }
+}
+
+fn distance(model: &Model, skin: &[[f32; 3]], from: &[[f32; 3]]) -> Distance {
+    let reference = ReferenceSkin::new(&model.description().skin);
+    let areas = reference.vertex_areas();
+    let squared = |i: usize| (0..3).map(|k| f64::from(skin[i][k] - from[i][k]).powi(2)).sum::<f64>();
+    let sum: f64 = (0..skin.len()).map(|i| areas[i] * squared(i)).sum();
+    let worst = (0..skin.len()).map(squared).fold(0.0, f64::max);
+    Distance { rms_m: (sum / areas.iter().sum::<f64>()).sqrt(), worst_m: worst.sqrt() }
+}
+
+/// The vertex of a skin that is nearest to a point.
+fn lowest_near(skin: &[[f32; 3]], p: &Point3<f64>) -> Point3<f64> {
+    let points = skin.iter().map(|v| Point3::from(*v).cast::<f64>());
+    points.min_by(|a, b| (a - p).norm_squared().total_cmp(&(b - p).norm_squared())).unwrap_or(*p)
+}

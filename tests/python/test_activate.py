@@ -1,0 +1,144 @@
+"""Examples that a job has made enrich the skin: from activation on, without a lost frame, and only where they belong."""
+
+import subprocess
+
+import numpy as np
+import pytest
+
+from client import ENRICHED, Client, read_frame, read_wrench, wait_until
+from test_jobs import SCENE, Motion, job, running, submit, until
+
+OTHER = SCENE.replace("young_modulus_pa = 3e4", "young_modulus_pa = 2e4")
+PRESSED = {"tool": "probe", "position": [0.021, 0.02, 0.0235], "orientation": [0, 0, 0, 1]}
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    path = tmp_path_factory.mktemp("scene") / "small.toml"
+    path.write_text(SCENE)
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def daemon(plicad, small, tmp_path_factory):
+    with running(plicad, small, tmp_path_factory.mktemp("daemon") / "plicad.log") as daemon:
+        yield daemon
+
+
+@pytest.fixture
+def client(daemon):
+    with Client(daemon.endpoint) as connected:
+        yield connected
+
+
+def made(client, name, kind="training", **request):
+    """Id of a job that is done."""
+    return until(client, submit(client, name, kind, **request)["id"], "done")["id"]
+
+
+@pytest.fixture(scope="module")
+def database(daemon):
+    with Client(daemon.endpoint) as client:
+        return made(client, "examples", examples=16, seed=3)
+
+
+def pressed(client):
+    """The frame of a press that is the same each time."""
+    client.rpc("pause")
+    client.rpc("reset")
+    client.rpc("step", {"ticks": 400, "poses": [PRESSED]})
+    return client.frame()
+
+
+def test_activating_loses_no_frame_and_changes_the_skin(daemon, client, database):
+    before = client.status()["objects"]["wedge"]
+    generation = pressed(client).generation
+    coarse = pressed(client)
+    assert (before["enriched"], before["confidence"], generation, coarse.flags & ENRICHED) == (False, None, 0, 0)
+    client.rpc("resume")
+    skins = client.collect("object/wedge/skin", read_frame)
+    wrenches = client.collect("tool/probe/wrench", read_wrench)
+    with Motion(client) as motion:  # at its end: a frame for each tick
+        reply = client.rpc("activate", {"database": database})
+        motion.check_that_ticks_go_on()
+    assert reply["database_generation"] == 1 and 8 <= reply["examples"] <= 16, reply
+    frames = skins.messages()
+    assert [f.generation for f in frames] == sorted(f.generation for f in frames)
+    assert {f.generation for f in frames} == {0, 1}
+    # Ticks count from reset on, and nothing was reset in between.
+    assert all((f.tick > reply["tick"]) == (f.generation == 1) for f in frames), reply
+    assert all(f.confidence == 0 and not f.flags & ENRICHED for f in frames if f.generation == 0)
+    assert any(f.confidence > 0 and f.flags & ENRICHED for f in frames)
+    assert any(w.confidence > 0 for w in wrenches.messages())
+
+    enriched = pressed(client)
+    off = np.linalg.norm(enriched.positions - coarse.positions, axis=1)
+    assert enriched.tick == coarse.tick and enriched.generation == 1 and enriched.confidence > 0
+    assert 1e-5 < off.max() < 5e-3, f"detail of up to {off.max()} m"
+    after = wait_until(lambda: (now := client.status()["objects"]["wedge"])["confidence"] and now, "confidence")
+    assert after["enriched"] and 0 < after["confidence"] <= 1, after
+    assert np.array_equal(pressed(client).positions, enriched.positions), "the same poses, the same bytes"
+    print(f"\n{len(frames)} frames over the change; detail of up to {1e3 * off.max():.3f} mm, "
+          f"confidence {enriched.confidence:.2f}")
+    client.rpc("resume")
+
+
+def test_activating_again_is_another_generation(daemon, client, database):
+    one = client.rpc("activate", {"database": database})["database_generation"]
+    path = daemon.data / "jobs" / database / "database.safetensors"
+    other = client.rpc("activate", {"database": str(path)})["database_generation"]
+    assert other == one + 1 == client.frame().generation
+
+
+def test_what_does_not_belong_is_refused_for_its_reason(daemon, client, database, tmp_path):
+    foreign = made(client, "foreign", examples=2, scene=OTHER)
+    held_out = made(client, "held-out", "evaluation", examples=2)
+    path = daemon.data / "jobs" / database / "database.safetensors"
+    damaged, cut, empty = tmp_path / "damaged", tmp_path / "cut", tmp_path / "empty"
+    whole = path.read_bytes()
+    damaged.write_bytes(whole[:-5] + bytes([whole[-5] ^ 1]) + whole[-4:])
+    cut.write_bytes(whole[:len(whole) // 2])
+    empty.write_bytes(b"")
+    slow = submit(client, "slow", examples=400)["id"]
+    generation = client.frame().generation
+    refusals = [
+        ({"database": foreign}, "bad_database", "another scene"),
+        ({"database": held_out}, "bad_database", "held-out"),
+        ({"database": str(damaged)}, "bad_database", "damaged"),
+        ({"database": str(cut)}, "bad_database", "truncated"),
+        ({"database": str(empty)}, "bad_database", "truncated"),
+        ({"database": str(tmp_path)}, "bad_database", "is no file"),
+        ({"database": "/dev/zero"}, "bad_database", "is no file"),
+        ({"database": "no/such"}, "bad_database", "no/such: cannot be read"),
+        ({"database": slow}, "job_state", "when it is done"),
+        ({"database": "9999"}, "unknown_job", "9999"),
+        ({}, "rpc_malformed", "database"),
+        ({"database": database, "now": True}, "rpc_malformed", "now"),
+    ]
+    for request, code, reason in refusals:
+        error = client.refused("activate", request)
+        assert error.code == code and reason in error.body["message"], f"{request}: {error}"
+        assert str(daemon.data) not in error.body["message"], "where jobs lie is nobody's business"
+    client.rpc("job_cancel", {"id": slow})
+    assert job(client, slow)["state"] == "cancelled"
+    assert client.frame().generation == generation
+    print("\n" + client.refused("activate", {"database": foreign}).body["message"])
+
+
+def test_a_daemon_starts_with_a_database(daemon, plicad, small, client, database, tmp_path):
+    path = daemon.data / "jobs" / database / "database.safetensors"
+    beside = tmp_path / "named.toml"
+    beside.write_text(SCENE + '[objects.wedge.enrichment]\ndatabase = "mine.safetensors"\n')
+    (tmp_path / "mine.safetensors").write_bytes(path.read_bytes())
+    client.rpc("activate", {"database": database})
+    expected = pressed(client)
+    for scene, options in ((small, ["--database", str(path)]), (str(beside), [])):
+        log = tmp_path / "plicad.log"
+        with running(plicad, scene, log, options=options) as started, Client(started.endpoint) as other:
+            frame = pressed(other)
+            assert frame.generation == 1 and np.array_equal(frame.positions, expected.positions)
+            started.stop()
+    client.rpc("resume")
+    refused = subprocess.run([plicad, "serve", str(beside), "--listen", "tcp/127.0.0.1:0", "--database", "no/such"],
+                             capture_output=True, text=True, timeout=60)
+    assert refused.returncode == 1 and "no/such: cannot be read" in refused.stderr, refused.stderr
