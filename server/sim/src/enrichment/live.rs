@@ -130,11 +130,16 @@ impl LiveEnrichment {
 
     /// Writes the enriched skin, `[n_skin]` \[m\], world axes.
     pub fn write_skin(&mut self, model: &Model, state: &State, out: &mut [[f32; 3]]) {
+        let n_windows = self.windows().count();
+        if n_windows == 0 {
+            state.write_skin(model, out);
+            return;
+        }
         state.write_padded_offsets(model, &mut self.offsets);
-        match self.windows().count() {
-            0 => self.total.fill([0.0; 4]),
-            1 => self.lay_one(model, state),
-            _ => self.lay_all(model, state),
+        if n_windows == 1 {
+            self.lay_one(model, state);
+        } else {
+            self.lay_all(model, state);
         }
         let mut largest = f32x4::ZERO;
         for (((out, rest), offset), detail) in out.iter_mut().zip(&self.rest).zip(&self.offsets).zip(&self.total) {
