@@ -95,6 +95,13 @@ fn an_evaluation_is_a_table_and_json() {
 
     let few = json(&place.run(&["evaluate", "block.toml", "--methods", "kriging-vector", "--examples", "5", "--json"]));
     assert_eq!(few["methods"][1]["examples"], 5);
+    assert!(few["slide"].is_null() && few["by_examples"].as_array().unwrap().is_empty());
+
+    let output = place.run(&["evaluate", "block.toml", "--methods", "rescale", "--slide", "--json"]);
+    let slide = &json(&output)["slide"];
+    assert!(slide["states"].as_u64().unwrap() >= 3 && slide["accurate"]["rms_mm"].as_f64().unwrap() > 0.0, "{slide}");
+    assert_eq!(slide["methods"][0]["name"], "rescale");
+    assert!(String::from_utf8_lossy(&output.stdout).contains("accurate (tied)"));
 }
 
 #[test]

@@ -61,6 +61,15 @@ pub enum Stop {
     Rejected(Reason, String),
 }
 
+impl std::fmt::Display for Stop {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Interrupted => f.write_str("interrupted"),
+            Self::Rejected(_, message) => f.write_str(message),
+        }
+    }
+}
+
 impl From<Interrupted> for Stop {
     fn from(_: Interrupted) -> Self {
         Self::Interrupted

@@ -33,6 +33,8 @@ pub struct Slide {
     pub states: usize,
     /// States with contact whose accurate solution was rejected.
     pub rejected: usize,
+    /// Why the first of them was.
+    pub first_rejection: Option<String>,
     /// From state to state \[mm\].
     pub step_mm: f64,
     /// Of the accurate solution, `tied`.
@@ -98,7 +100,7 @@ pub fn slide(
 ) -> Result<Slide, SlideError> {
     let (tool, poses) = poses(setup)?;
     let mut stations: Vec<Option<Station>> = Vec::new();
-    let mut rejected = 0;
+    let (mut rejected, mut first_rejection) = (0, None);
     let mut tandem = Tandem::new(setup).map_err(TrainingError::from)?;
     let interrupted = |_| SlideError::Training(TrainingError::Interrupted);
     let walked = tandem.walk(
@@ -107,7 +109,10 @@ pub fn slide(
         |tandem, half| {
             told(stations.len(), poses.len(), "slides");
             let tied = half.as_ref().map(|half| tandem.solve_tied(half, cancelled));
-            rejected += usize::from(matches!(tied, Some(Err(_))));
+            if let Some(Err(stop)) = &tied {
+                rejected += 1;
+                first_rejection.get_or_insert_with(|| stop.to_string());
+            }
             stations.push(half.zip(tied.and_then(Result::ok)).map(|(half, tied)| Station {
                 touch: Touch {
                     contact_point: half.contact.position,
@@ -128,6 +133,7 @@ pub fn slide(
     let mut found = Slide {
         states: accurate.iter().flatten().count(),
         rejected,
+        first_rejection,
         step_mm: 1e3 * STEP_M,
         accurate: roughness(judge, &accurate).ok_or(SlideError::TooShort)?,
         methods: Vec::new(),
@@ -151,8 +157,8 @@ pub fn slide(
 /// The tool, and its poses from first touch at one end of the region to where it leaves at the other.
 fn poses(setup: &Setup) -> Result<(usize, Vec<Isometry3<f64>>), SlideError> {
     let Source::Press(ranges) = &setup.training.source else { return Err(SlideError::NotDrawn) };
-    let share = 0.5 * (ranges.depth_share[0] + ranges.depth_share[1]);
-    let ranges = PressRanges { depth_share: [share; 2], drag_share: 0.0, ..ranges.clone() };
+    // As shallow as training presses: a long drag adds to the depth.
+    let ranges = PressRanges { depth_share: [ranges.depth_share[0]; 2], drag_share: 0.0, ..ranges.clone() };
     let mut set = setup.training.clone();
     (set.source, set.count, set.candidates_per_example) = (Source::Press(ranges), CANDIDATES, 1);
     let tool = set.tool;

@@ -170,7 +170,7 @@ fn name_points(
     let names = names.map(|p| (p.name.replace(&format!("{COARSE}, "), ""), *p, colour(p), 10));
     for (label, point, colour, size) in numbers.chain(names) {
         let at = scales.pixel(point);
-        let extent = [0.27 * f64::from(size) * label.len() as f64 + 1.0, 0.5 * f64::from(size) + 1.0];
+        let extent = [0.25 * f64::from(size) * label.len() as f64 + 1.0, 0.5 * f64::from(size) + 1.0];
         let Some(spot) = place(at, extent, &taken, FRAME) else { continue };
         if let Some(end) = spot.leader(at) {
             line(area, &[at, end], colour.mix(0.4).into())?;

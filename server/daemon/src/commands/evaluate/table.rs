@@ -41,6 +41,7 @@ fn print_slide(slide: &Slide) {
         "slide: {} states {:.1} mm apart ({} rejected); second difference of d [mm], RMS and largest; E",
         slide.states, slide.step_mm, slide.rejected
     );
+    slide.first_rejection.iter().for_each(|why| println!("the first rejection: {why}"));
     row("accurate (tied)", &slide.accurate, "");
     slide.methods.iter().for_each(|m| row(&m.name, &m.roughness, &m.error.as_ref().map_or_else(String::new, three)));
 }
