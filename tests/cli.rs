@@ -197,6 +197,23 @@ fn with_json_a_refusal_is_an_object_on_standard_output_too() {
     }
 }
 
+/// Confidence in the frames file, and the stage of the bench, need a database; a wrong one is refused by name.
+#[test]
+fn simulate_and_bench_refuse_what_is_no_database() {
+    let folder = TempDir::new().unwrap();
+    let (poses, out) = (folder.path().join("poses.csv"), folder.path().join("out.safetensors"));
+    write_poses(&poses);
+    simulate(&poses, &out);
+    let (poses, out) = (poses.to_str().unwrap(), out.to_str().unwrap());
+    for arguments in [
+        &["bench", "wedge", "--database", out][..],
+        &["simulate", "wedge", "--poses", poses, "--out", out, "--database", out],
+    ] {
+        let said = errors(&plicad(arguments));
+        assert!(said.contains(out) && said.contains("not an example database"), "{said}");
+    }
+}
+
 #[test]
 fn bench_reports_every_stage() {
     let said = last_line(&plicad(&["bench", "wedge", "--ticks", "300", "--json"]));
@@ -210,9 +227,11 @@ fn bench_reports_every_stage() {
 }
 
 #[test]
-fn the_demo_reports_and_writes_a_picture_and_a_mesh() {
+fn the_demo_trains_once_reports_and_writes_pictures_and_a_mesh() {
     let folder = TempDir::new().unwrap();
-    let said = last_line(&plicad(&["demo", "--seconds", "2", "--out", folder.path().to_str().unwrap(), "--json"]));
+    let out = folder.path().to_str().unwrap();
+    let demo = |seconds| last_line(&plicad(&["demo", "--examples", "8", "--seconds", seconds, "--out", out, "--json"]));
+    let said = demo("2");
     let number = |v: &Value| v.as_f64().unwrap_or_else(|| panic!("{said}"));
     assert!(number(&said["ticks"]) > 500.0);
     for quantile in ["p50", "p99", "p999"] {
@@ -221,9 +240,19 @@ fn the_demo_reports_and_writes_a_picture_and_a_mesh() {
     assert!(number(&said["overruns"]) >= 0.0);
     assert!(number(&said["frames_received"]) > 10.0, "{said}");
     assert!(number(&said["max_penetration_m"]) < 1e-2 && number(&said["peak_force_n"]) > 0.1, "{said}");
+    assert!(number(&said["frames_enriched"]) > 10.0, "{said}");
+    let rms = |which: &str| number(&said["held_out"][which]["rms_m"]);
+    assert!(0.0 < rms("enriched") && rms("enriched") < 0.5 * rms("coarse"), "{said}");
     let start = |key: &str| fs::read(repository().join(said[key].as_str().unwrap())).unwrap()[..4].to_vec();
     assert_eq!(start("picture"), b"\x89PNG");
+    assert_eq!(start("live_picture"), b"\x89PNG");
     assert_eq!(start("glb"), b"glTF");
+
+    // The second time it finds the examples of the first, and says the same of them.
+    assert!(number(&said["trained"]["seconds"]) > 0.0, "{said}");
+    let again = demo("1");
+    assert_eq!(again["trained"]["seconds"], 0.0);
+    assert_eq!(again["held_out"], said["held_out"]);
 }
 
 /// `plicad serve` on a free port with a data folder of its own; ended when dropped.

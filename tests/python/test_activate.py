@@ -7,6 +7,7 @@ import pytest
 
 from client import ENRICHED, Client, read_frame, read_wrench, wait_until
 from test_jobs import SCENE, Motion, job, running, submit, until
+from test_lockstep import read_safetensors
 
 OTHER = SCENE.replace("young_modulus_pa = 3e4", "young_modulus_pa = 2e4")
 PRESSED = {"tool": "probe", "position": [0.021, 0.02, 0.0235], "orientation": [0, 0, 0, 1]}
@@ -123,6 +124,22 @@ def test_what_does_not_belong_is_refused_for_its_reason(daemon, client, database
     assert job(client, slow)["state"] == "cancelled"
     assert client.frame().generation == generation
     print("\n" + client.refused("activate", {"database": foreign}).body["message"])
+
+
+def test_simulate_gives_the_enriched_bytes_of_the_daemon(daemon, plicad, small, client, database, tmp_path):
+    path = daemon.data / "jobs" / database / "database.safetensors"
+    csv, out = tmp_path / "poses.csv", tmp_path / "run.safetensors"
+    place = ",".join(repr(float(x)) for x in PRESSED["position"] + PRESSED["orientation"])
+    csv.write_text("time_s,tool,px,py,pz,qx,qy,qz,qw\n" + "".join(f"{t},probe,{place}\n" for t in (0.0, 0.399)))
+    command = [plicad, "simulate", small, "--poses", str(csv), "--out", str(out), "--database", str(path)]
+    subprocess.run(command, check=True, timeout=60)
+    simulated = read_safetensors(out)
+    client.rpc("activate", {"database": database})
+    frame = pressed(client)
+    assert simulated["tick"][-1] == frame.tick == 400
+    assert np.array_equal(simulated["positions"][-1], frame.positions)
+    assert simulated["confidence"][-1] == np.float32(frame.confidence) > 0
+    client.rpc("resume")
 
 
 def test_a_daemon_starts_with_a_database(daemon, plicad, small, client, database, tmp_path):

@@ -97,6 +97,14 @@ fn jobs_are_listed_cancelled_and_resumed() {
 }
 
 #[test]
+fn the_examples_of_a_job_or_of_a_file_are_activated() {
+    let daemon = SmallDaemon::start();
+    let reply = ask(&daemon, &["activate", DONE]);
+    assert_eq!((&reply["examples"], &reply["database_generation"]), (&8.into(), &2.into()), "{reply}");
+    assert_eq!(daemon.client().activate("wedge.safetensors").unwrap().examples, 9);
+}
+
+#[test]
 fn watching_ends_with_the_job() {
     let daemon = SmallDaemon::start();
     assert_eq!(ask(&daemon, &["watch", ENDS])["state"], "done");

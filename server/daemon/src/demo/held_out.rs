@@ -15,7 +15,7 @@ use crate::config::Config;
 use crate::enrichment::{Enrichment, touch};
 use crate::{scene, training};
 
-/// The deepest of so many held-out presses is shown.
+/// Of so many held-out presses the one nearest to the middle of the object is shown.
 const N_CANDIDATES: usize = 8;
 
 /// One press, three skins.
@@ -55,7 +55,7 @@ pub struct Distance {
 /// Solves the press and enriches it with a database.
 pub(super) fn held_out(config: &Config, database: &Path) -> anyhow::Result<HeldOut> {
     let setup = training::setup(config)?;
-    let interaction = deepest(&setup)?;
+    let interaction = most_central(&setup)?;
     let example = solve(&setup, &interaction)?;
     let model = Arc::new(scene::build(config)?);
     let enrichment = Enrichment::new(config, &model)?;
@@ -94,11 +94,15 @@ pub(super) fn held_out(config: &Config, database: &Path) -> anyhow::Result<HeldO
 }
 
 /// Among the first of the interactions that an evaluation of the scene holds out.
-fn deepest(setup: &Setup) -> anyhow::Result<Interaction> {
+fn most_central(setup: &Setup) -> anyhow::Result<Interaction> {
     let mut in_region = setup.evaluation.first().context("the scene has no held-out interactions")?.clone();
     in_region.count = N_CANDIDATES;
     let all = plan(setup, &[in_region], setup.evaluation_seed)?;
-    all.into_iter().max_by(|a, b| a.depth_m().total_cmp(&b.depth_m())).context("no held-out interaction")
+    let skin = setup.coarse.skin.positions();
+    let first = skin.first().context("the skin has no vertices")?;
+    let [min, max] = skin.iter().fold([*first; 2], |[min, max], p| [min.inf(p), max.sup(p)]);
+    let off = |i: &Interaction| (i.contact_point() - nalgebra::center(&min, &max)).xy().norm();
+    all.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))).context("no held-out interaction")
 }
 
 fn solve(setup: &Setup, interaction: &Interaction) -> anyhow::Result<Example> {

@@ -53,9 +53,9 @@ pub fn draw_contrast(contrast: &Contrast<'_>) -> RgbImage {
     draw_sections(&mut canvas, contrast);
     let mut picture = canvas.reduced(OVERSAMPLING);
     caption(&mut picture, contrast);
-    legend(&mut picture, COLUMNS[0] + 20, "DISPLACEMENT (MM)   GRID 10 MM", displacement_end_m);
+    legend(&mut picture, [COLUMNS[2] + 20, 46], "DISPLACEMENT (MM)   GRID 10 MM", displacement_end_m);
     let title = format!("DISTANCE FROM {} (MM)", contrast.versions[2].name.to_uppercase());
-    legend(&mut picture, COLUMNS[1] + 20, &title, distance_end_m);
+    legend(&mut picture, [COLUMNS[0] + 20, 838], &title, distance_end_m);
     names(&mut picture, contrast);
     picture.into_image()
 }
@@ -79,12 +79,13 @@ fn draw_views(canvas: &mut Canvas, contrast: &Contrast<'_>) -> f32 {
     for ((version, lengths), x) in contrast.versions.iter().zip(all).zip(COLUMNS) {
         let subject = subject(contrast, version.positions, true);
         let look = Look::coloured(&subject, lengths, end_m);
-        let rect = Rect { x, y: 168, w: COLUMN_WIDTH, h: 350 }.times(OVERSAMPLING);
+        let rect = Rect { x, y: 164, w: COLUMN_WIDTH, h: 356 }.times(OVERSAMPLING);
         let [min, max] = look.bounds;
         let size = (max - min).norm();
-        let eye = contrast.focus + size * Vector3::new(-0.40, -1.0, 0.72);
-        let target = contrast.focus + Vector3::new(0.0, 0.0, 0.03 * size);
-        draw_panel(canvas, &look, &Panel { rect, camera: Camera::perspective(eye, target, 0.42, &rect), cut_y: None });
+        let centre = nalgebra::center(&min, &max);
+        let eye = centre + size * Vector3::new(-0.62, -1.45, 1.25);
+        let target = centre + Vector3::new(0.02 * size, 0.0, 0.02 * size);
+        draw_panel(canvas, &look, &Panel { rect, camera: Camera::perspective(eye, target, 0.405, &rect), cut_y: None });
     }
     end_m
 }
@@ -97,7 +98,7 @@ fn draw_maps(canvas: &mut Canvas, contrast: &Contrast<'_>) -> f32 {
     for ((version, lengths), x) in [coarse, enriched].into_iter().zip(all).zip(COLUMNS) {
         let subject = subject(contrast, version.positions, false);
         let look = Look::coloured(&subject, lengths, end_m);
-        let rect = Rect { x, y: 540, w: COLUMN_WIDTH, h: 262 }.times(OVERSAMPLING);
+        let rect = Rect { x, y: 548, w: COLUMN_WIDTH, h: 260 }.times(OVERSAMPLING);
         let [min, max] = look.bounds;
         let camera = Camera::orthographic(
             nalgebra::center(&min, &max),
@@ -113,7 +114,7 @@ fn draw_maps(canvas: &mut Canvas, contrast: &Contrast<'_>) -> f32 {
 
 /// The skins cut along x through the focus, near the tool.
 fn draw_sections(canvas: &mut Canvas, contrast: &Contrast<'_>) {
-    let rect = Rect { x: COLUMNS[2], y: 540, w: COLUMN_WIDTH, h: 262 }.times(OVERSAMPLING);
+    let rect = Rect { x: COLUMNS[2], y: 548, w: COLUMN_WIDTH, h: 260 }.times(OVERSAMPLING);
     let rest = &contrast.surface.rest;
     let length_m = rest.iter().map(|p| f64::from(p[0])).fold(0.0, f64::max);
     let centre = contrast.focus - Vector3::new(0.0, 0.0, 0.005 * length_m);

@@ -101,12 +101,12 @@ fn caption(picture: &mut Canvas, look: &Look<'_>) {
     picture.text(40, 66, 2, &look.subject.subtitle.to_uppercase(), colour::SOFT_INK);
     picture.text(1084, 62, 2, "SECTION THROUGH THE CONTACT", colour::SOFT_INK);
     picture.text(1084, 492, 2, "FROM ABOVE", colour::SOFT_INK);
-    legend(picture, 40, "DISPLACEMENT (MM)   GRID 10 MM   LINES: REST SHAPE", look.scale_end_m);
+    legend(picture, [40, 838], "DISPLACEMENT (MM)   GRID 10 MM   LINES: REST SHAPE", look.scale_end_m);
 }
 
 /// A bar of the colour scale with five marks in millimetres.
-fn legend(picture: &mut Canvas, x: u32, title: &str, end_m: f32) {
-    let (y, w, h) = (838, 420, 18);
+fn legend(picture: &mut Canvas, [x, y]: [u32; 2], title: &str, end_m: f32) {
+    let (w, h) = (420, 18);
     for i in 0..w {
         picture.fill(Rect { x: x + i, y, w: 1, h }, colour::scale(i as f32 / (w - 1) as f32));
     }
