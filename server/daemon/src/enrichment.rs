@@ -4,10 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector3};
 use plica_sim::Model;
-use plica_sim::enrichment::{Enricher, EnricherError, EnrichmentOptions, Examples, LiveEnrichment, Touch};
-use plica_training::{Database, DatabaseError, Example, JobKind};
+use plica_sim::enrichment::{Enricher, EnricherError, EnrichmentOptions, LiveEnrichment};
+use plica_training::{Database, DatabaseError, JobKind};
 
 use crate::config::Config;
 use crate::training::{HashError, scene_hash};
@@ -85,7 +84,7 @@ impl Enrichment {
         if database.about.kind == JobKind::Evaluation {
             return Err(EnrichmentError::HeldOut { path: path.to_owned() });
         }
-        let enricher = Enricher::new(&self.model, &examples(&database), self.options);
+        let enricher = Enricher::new(&self.model, &database.leading_examples(usize::MAX), self.options);
         let enricher = enricher.map_err(|source| EnrichmentError::Enricher { path: path.to_owned(), source })?;
         Ok(Ready { enricher: Arc::new(enricher), n_examples: database.examples.len() })
     }
@@ -107,22 +106,6 @@ pub fn at_start(config: &Config, model: &Arc<Model>) -> Result<Option<(Enrichmen
     let enrichment = Enrichment::new(config, model)?;
     let ready = enrichment.read(path)?;
     Ok(Some((enrichment, ready)))
-}
-
-/// Examples as the run time takes them.
-pub fn examples(database: &Database) -> Examples {
-    let all = &database.examples;
-    Examples {
-        displacements: all.iter().map(|e| e.displacements.clone()).collect(),
-        details: all.iter().map(|e| e.detail.clone()).collect(),
-        touches: all.iter().map(touch).collect(),
-    }
-}
-
-/// Where the tool of an example touched.
-pub fn touch(example: &Example) -> Touch {
-    let [x, y, z, ..] = example.tool_pose;
-    Touch { contact_point: Vector3::from(example.contact_point).into(), tool_origin: Point3::new(x, y, z) }
 }
 
 /// A device or a pipe would be read without end.

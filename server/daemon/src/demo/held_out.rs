@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::isometry;
 use crate::config::Config;
-use crate::enrichment::{Enrichment, touch};
+use crate::enrichment::Enrichment;
 use crate::{scene, training};
 
 /// Of so many held-out presses the one nearest to the middle of the object is shown.
@@ -67,7 +67,7 @@ pub(super) fn held_out(config: &Config, database: &Path) -> anyhow::Result<HeldO
     let mut offsets = vec![[0.0; 4]; model.n_skin()];
     state.write_padded_offsets(&model, &mut offsets);
     let mut detail = vec![[0.0; 4]; model.n_skin()];
-    let touch = touch(&example);
+    let touch = example.touch();
     let confidence = enricher.evaluate(&model, &state, &offsets, &touch, &mut enricher.scratch(), &mut detail);
 
     let mut coarse = vec![[0.0; 3]; model.n_skin()];
