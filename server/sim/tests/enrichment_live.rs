@@ -171,6 +171,19 @@ fn detail_never_pushes_the_skin_into_the_tool() {
 }
 
 #[test]
+fn other_examples_take_over_what_is_held() {
+    let mut it = Enriched::new(1);
+    it.glide(deep(0.05, 0.03, 0.0), deep(0.05, 0.03, 0.005), 200, |_| ());
+    it.tick(&[Point3::new(0.05, 0.03, 0.2)]);
+    let held = it.detail();
+    let mut other = LiveEnrichment::new(&it.run.model, Arc::clone(it.live.enricher()));
+    other.adopt(&it.live);
+    it.live = other;
+    it.look();
+    assert!(held > 1e-3 && it.change() < 1e-9, "{held} {}", it.change());
+}
+
+#[test]
 fn a_reset_forgets() {
     let mut it = Enriched::new(1);
     it.glide(deep(0.05, 0.03, 0.0), deep(0.05, 0.03, 0.005), 200, |_| ());

@@ -21,14 +21,16 @@ impl Detail {
     /// Takes over from what was active, which is returned, so that it is freed elsewhere.
     pub(super) fn activate(
         &mut self,
-        live: Box<LiveEnrichment>,
+        mut live: Box<LiveEnrichment>,
         model: &Model,
         state: &State,
     ) -> Option<Box<LiveEnrichment>> {
         self.generation = self.generation.wrapping_add(1);
-        let retired = self.live.replace(live);
-        self.begin_anew(model, state);
-        retired
+        match &self.live {
+            Some(active) => live.adopt(active),
+            None => live.follow(model, state),
+        }
+        self.live.replace(live)
     }
 
     /// Knows the contacts of a state, and none from before it.

@@ -161,7 +161,9 @@ fn a_cancelled_process_that_will_not_go_is_ended() {
     assert_eq!(daemon.jobs.cancel(&running).unwrap_err().to_string(), "job 0001 is cancelled already");
     // Resumed while its process may still be ending: it runs once more, and only once at a time.
     workplace.replace_script("finish");
-    assert_eq!(daemon.jobs.resume(&running).unwrap().state, JobState::Queued);
+    // The supervisor may have started it before the answer is put together.
+    let state = daemon.jobs.resume(&running).unwrap().state;
+    assert!(matches!(state, JobState::Queued | JobState::Running), "{state:?}");
     daemon.wait_for(&running, JobState::Done);
     assert_eq!(daemon.get(&waiting).state, JobState::Cancelled);
     assert!(daemon.jobs.resume(&running).unwrap_err().to_string().contains("job 0001 is done; only"));

@@ -92,6 +92,11 @@ impl LiveEnrichment {
         &self.enricher
     }
 
+    /// Takes over the windows of another enrichment of the same model: its examples change while tools touch.
+    pub fn adopt(&mut self, other: &Self) {
+        self.tools.copy_from_slice(&other.tools);
+    }
+
     /// Forgets all contacts: the state was reset or restored.
     pub fn forget(&mut self) {
         self.tools.fill(ToolWindows::default());

@@ -1,7 +1,7 @@
 //! Enrichment: what the coarse skin misses, learned from examples \[SSH12, 5\].
 //!
-//! For each contact the skin is laid out around the contact point ([`charts`]), a correlator weighs the examples by their likeness
-//! to the present state, and an interpolator ([`field`]) lays their detail on the skin. An [`Enricher`] is one such way with its
+//! For each contact the skin is laid out around the contact point (`charts.rs`), a correlator weighs the examples by their likeness
+//! to the present state, and an interpolator (`field.rs`) lays their detail on the skin. An [`Enricher`] is one such way with its
 //! tables; it never changes. A [`LiveEnrichment`] follows the contacts of a running simulation with one.
 
 mod charts;
