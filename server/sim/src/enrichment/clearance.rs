@@ -19,6 +19,9 @@ pub(crate) fn keep_clear(
             continue;
         }
         for (lane, position) in positions.iter_mut().enumerate() {
+            if !(0..3).all(|k| position[k] > low[k] && position[k] < high[k]) {
+                continue;
+            }
             let (gap, normal) = solid.distance(&placement.to_local(V3::from(*position)));
             if gap >= 0.0 {
                 continue;

@@ -4,7 +4,7 @@
 //! skin: `f_j = sum_v h(q_v - q_j) A_v u_v / sum_v h A_v`, times the root of a Gaussian that falls off with distance.
 
 use nalgebra::Vector3;
-use plica_geometry::ReferenceSkin;
+use plica_geometry::{ReferenceSkin, VertexIdx};
 
 use super::charts::anchors;
 use super::situation::Situation;
@@ -18,12 +18,21 @@ const SAMPLES: f64 = 3.0;
 /// A stencil point with less than this share of a pitch squared under it counts for less.
 const LEAST_AREA: f32 = 0.25;
 
+/// A vertex that is looked at.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    /// At rest \[m\].
+    position: Vector3<f32>,
+    vertex: u32,
+    /// Around it \[m2\].
+    area: f32,
+}
+
 /// The stencil on one skin.
 #[derive(Debug, Clone)]
 pub(crate) struct Stencil {
     pitch: f32,
-    /// Vertices that are looked at, and the area around each \[m2\].
-    samples: Vec<(u32, f32)>,
+    samples: Vec<Sample>,
     /// Root of the Gaussian at each point.
     shares: [f32; N * N],
 }
@@ -44,7 +53,12 @@ impl Stencil {
             let squared = ((j / N) as f64 - middle).powi(2) + ((j % N) as f64 - middle).powi(2);
             (-squared * (pitch / width).powi(2) / 4.0).exp() as f32
         };
-        let samples = vertices.iter().zip(areas).map(|(v, area)| (v.index() as u32, area as f32)).collect();
+        let sample = |(v, area): (&VertexIdx, f64)| Sample {
+            position: positions[v.index()].coords.cast(),
+            vertex: v.index() as u32,
+            area: area as f32,
+        };
+        let samples = vertices.iter().zip(areas).map(sample).collect();
         Self { pitch: pitch as f32, samples, shares: std::array::from_fn(share) }
     }
 
@@ -53,7 +67,10 @@ impl Stencil {
         let mut sums = [Vector3::<f32>::zeros(); N * N];
         let mut areas = [0.0_f32; N * N];
         let middle = (N / 2) as f32;
-        for &(vertex, area) in &self.samples {
+        // What is farther away than the corner of the stencil is farther along the skin, too.
+        let reach = (2.0_f32.sqrt() * self.pitch * (middle + 1.0)).powi(2);
+        let is_near = |sample: &&Sample| (sample.position - situation.contact_point).norm_squared() < reach;
+        for &Sample { vertex, area, .. } in self.samples.iter().filter(is_near) {
             let [x, y] = situation.coordinates(vertex as usize).map(|q| q / self.pitch + middle);
             if x <= -1.0 || y <= -1.0 || x >= N as f32 || y >= N as f32 {
                 continue;
