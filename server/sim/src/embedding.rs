@@ -164,6 +164,12 @@ impl SkinPositions {
         std::array::from_fn(|k| bytemuck::cast_slice::<F, f32>(&self.positions[cluster][k]))
     }
 
+    /// One axis of sixteen vertices \[m\].
+    #[inline(always)]
+    pub(crate) fn group(&self, axis: usize, group: usize) -> F {
+        self.positions[group / GROUPS][axis][group % GROUPS]
+    }
+
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.positions.copy_from_slice(&other.positions);
         self.boxes.copy_from_slice(&other.boxes);

@@ -10,9 +10,10 @@ use super::field::{Field, FieldScratch};
 use super::kriging::KrigingChoice;
 use super::options::{Correlator, EnrichmentOptions};
 use super::rescale::Rescale;
-use super::situation::{Situation, Touch, coordinates};
+use super::situation::{Offsets, Situation, Touch, coordinates};
 use super::surface::{Place, Surface};
-use crate::lanes::{F, Node};
+use crate::contact::V3;
+use crate::lanes::{F, LANES, Node};
 use crate::model::Model;
 use crate::state::State;
 
@@ -156,23 +157,61 @@ impl Enricher {
     /// The same with bounds for the share that is laid on the skin.
     pub(crate) fn evaluate_within(
         &self,
-        [least, most]: [f32; 2],
+        bounds: [f32; 2],
         displacements: &[Node],
         offsets: &[Node],
         touch: &Touch,
         scratch: &mut EnricherScratch,
         detail: &mut [Node],
     ) -> Trust {
-        let EnricherScratch { layout, weights, kernel, field } = scratch;
-        let Some(place) = self.lay_out(touch, layout) else {
+        let offsets = Offsets::Padded(offsets);
+        let Some((place, trust)) = self.weigh(bounds, (displacements, offsets), touch, scratch) else {
             detail.fill([0.0; 4]);
             return Trust::NONE;
         };
+        let EnricherScratch { layout, weights, field, .. } = scratch;
+        let situation = situation(displacements, offsets, layout, &place, touch);
+        self.field.evaluate(&situation, weights, trust.share, field, detail);
+        trust
+    }
+
+    /// Whether [`Enricher::sample_within`] does all that [`Enricher::evaluate`] does.
+    pub(crate) fn is_sampled(&self) -> bool {
+        self.field.is_sampled()
+    }
+
+    /// Hands out detail sixteen vertices at a time instead of filling an array: half the memory that an evaluation moves.
+    pub(crate) fn sample_within(
+        &self,
+        bounds: [f32; 2],
+        (model, state): (&Model, &State),
+        touch: &Touch,
+        scratch: &mut EnricherScratch,
+        each: impl FnMut(usize, &[Node; LANES]),
+    ) -> Option<Trust> {
+        let displacements = &state.u[..model.n_free];
+        let offsets = Offsets::Between(&state.skin, self.surface.rest());
+        let (place, trust) = self.weigh(bounds, (displacements, offsets), touch, scratch)?;
+        let EnricherScratch { layout, weights, field, .. } = scratch;
+        let situation = situation(displacements, offsets, layout, &place, touch);
+        self.field.sample(&situation, weights, trust.share, field, each);
+        Some(trust)
+    }
+
+    /// Lays the skin out around the contact point and weighs the examples; `None` where no chart reaches.
+    fn weigh(
+        &self,
+        [least, most]: [f32; 2],
+        (displacements, offsets): (&[Node], Offsets<'_>),
+        touch: &Touch,
+        scratch: &mut EnricherScratch,
+    ) -> Option<(Place, Trust)> {
+        let EnricherScratch { layout, weights, kernel, .. } = scratch;
+        let place = self.lay_out(touch, layout)?;
         let situation = situation(displacements, offsets, layout, &place, touch);
         let mut trust = self.correlation.weigh(&situation, kernel, weights);
         trust.share = if self.options.fade { trust.share.clamp(least, most) } else { 1.0 };
-        self.field.evaluate(&situation, weights, trust.share, field, detail);
-        trust
+        Some((place, trust))
     }
 
     /// Detail with given weights `[n]`, in place of the correlator's: to see what interpolation alone does.
@@ -188,7 +227,8 @@ impl Enricher {
         let EnricherScratch { layout, field, .. } = scratch;
         detail.fill([0.0; 4]);
         if let Some(place) = self.lay_out(touch, layout) {
-            let situation = situation(&state.u[..model.n_free], offsets, layout, &place, touch);
+            let displacements = &state.u[..model.n_free];
+            let situation = situation(displacements, Offsets::Padded(offsets), layout, &place, touch);
             self.field.evaluate(&situation, weights, 1.0, field, detail);
         }
     }
@@ -204,6 +244,12 @@ impl Enricher {
     /// The skin vertex nearest to a contact point.
     pub(crate) fn nearest_vertex(&self, touch: &Touch) -> usize {
         self.surface.nearest(&touch.contact_point)
+    }
+
+    /// How far a vertex is from where it rests \[m\].
+    pub(crate) fn offset(&self, state: &State, vertex: usize) -> f32 {
+        let rest = self.surface.reference().skin().positions()[vertex].coords.cast::<f32>();
+        (V3::from(state.skin.vertex(vertex)) - rest).norm()
     }
 
     /// How much a vertex belongs to the contact that was last evaluated: 1 there, 0 where its chart ends.
@@ -222,7 +268,7 @@ impl Enricher {
 /// What is seen of a contact.
 pub(crate) fn situation<'a>(
     displacements: &'a [Node],
-    offsets: &'a [Node],
+    offsets: Offsets<'a>,
     layout: &'a [[F; 2]],
     place: &Place,
     touch: &Touch,

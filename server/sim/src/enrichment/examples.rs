@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::charts::Charts;
 use super::enricher::{EnricherError, situation};
-use super::situation::{Situation, Touch};
+use super::situation::{Offsets, Situation, Touch};
 use super::surface::{Place, Surface};
 use crate::lanes::{F, Node};
 use crate::model::Model;
@@ -64,7 +64,7 @@ impl SeenExamples {
     pub(crate) fn situations(&self) -> Vec<Situation<'_>> {
         let of_example = |i: usize| {
             let (u, offsets, layout) = (&self.displacements[i], &self.offsets[i], &self.layouts[i]);
-            situation(u, offsets, layout, &self.places[i], &self.touches[i])
+            situation(u, Offsets::Padded(offsets), layout, &self.places[i], &self.touches[i])
         };
         (0..self.places.len()).map(of_example).collect()
     }

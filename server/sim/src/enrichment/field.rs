@@ -217,26 +217,48 @@ impl Field {
         scratch: &mut FieldScratch,
         out: &mut [Node],
     ) {
-        let FieldScratch { coefficients, planar, texels } = scratch;
-        self.blend_stamps(situation, weights, (coefficients, planar), texels);
-        let far = f32x4::splat(self.far);
-        let share = f32x4::splat(share);
-        for (q, (offsets, out)) in
-            situation.layout.iter().zip(situation.offsets.chunks(LANES).zip(out.chunks_mut(LANES)))
-        {
-            let (texel, x, y) = self.lattice.locate(q);
-            for (lane, (u, out)) in offsets.iter().zip(out).enumerate() {
-                let sampled = self.lattice.sample(texels, (texel[lane], x[lane], y[lane]));
-                let rescaled = far + f32x4::splat(sampled.to_array()[3]);
-                *out = (share * (sampled - rescaled * f32x4::from(*u))).to_array();
-            }
-        }
+        self.sample(situation, weights, share, scratch, |group, detail| {
+            let out = &mut out[group * LANES..];
+            let n = out.len().min(LANES);
+            out[..n].copy_from_slice(&detail[..n]);
+        });
+        let (FieldScratch { coefficients, planar, .. }, share) = (scratch, f32x4::splat(share));
         if let Some(warp) = &self.warp {
             warp.add(situation, weights, share, self.options.window, out);
         }
         if let Some(vectors) = &self.vectors {
             vectors.blend(weights, coefficients, planar);
             self.add_vectors(situation, planar, share, out);
+        }
+    }
+
+    /// Whether [`Field::sample`] is all of the detail.
+    pub(crate) fn is_sampled(&self) -> bool {
+        self.warp.is_none() && self.vectors.is_none()
+    }
+
+    /// Hands out stamps and rescaling, sixteen vertices at a time \[m\].
+    #[inline(always)]
+    pub(crate) fn sample(
+        &self,
+        situation: &Situation<'_>,
+        weights: &[f32],
+        share: f32,
+        scratch: &mut FieldScratch,
+        mut each: impl FnMut(usize, &[Node; LANES]),
+    ) {
+        let FieldScratch { coefficients, planar, texels } = scratch;
+        self.blend_stamps(situation, weights, (coefficients, planar), texels);
+        let (far, share) = (f32x4::splat(self.far), f32x4::splat(share));
+        for (group, q) in situation.layout.iter().enumerate() {
+            let (texel, x, y) = self.lattice.locate(q);
+            let offsets = situation.offsets.group(group);
+            let detail = std::array::from_fn(|lane| {
+                let sampled = self.lattice.sample(texels, (texel[lane], x[lane], y[lane]));
+                let rescaled = far + f32x4::splat(sampled.to_array()[3]);
+                (share * (sampled - rescaled * f32x4::from(offsets[lane]))).to_array()
+            });
+            each(group, &detail);
         }
     }
 

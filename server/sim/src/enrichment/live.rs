@@ -12,7 +12,8 @@ use super::clearance::keep_clear;
 use super::enricher::{Enricher, EnricherScratch};
 use super::fade::Trust;
 use super::situation::{Touch, vector};
-use crate::lanes::Node;
+use crate::contact::V3;
+use crate::lanes::{LANES, Node};
 use crate::model::Model;
 use crate::state::State;
 use crate::step::placement;
@@ -62,7 +63,6 @@ pub struct LiveEnrichment {
     enricher: Arc<Enricher>,
     scratch: EnricherScratch,
     tools: Vec<ToolWindows>,
-    rest: Vec<Node>,
     offsets: Vec<Node>,
     detail: Vec<Node>,
     /// Shares of the windows at each vertex: sum and largest.
@@ -74,11 +74,9 @@ impl LiveEnrichment {
     /// Nothing touched yet.
     pub fn new(model: &Model, enricher: Arc<Enricher>) -> Self {
         let n_skin = model.n_skin();
-        let rest = model.description().skin.positions().iter().map(|p| [p.x as f32, p.y as f32, p.z as f32, 0.0]);
         Self {
             scratch: enricher.scratch(),
             tools: vec![ToolWindows::default(); model.n_tools()],
-            rest: rest.collect(),
             offsets: vec![[0.0; 4]; n_skin],
             detail: vec![[0.0; 4]; n_skin],
             shares: vec![[0.0; 2]; n_skin],
@@ -127,7 +125,7 @@ impl LiveEnrichment {
                 let tool_origin = reading.proxy.translation.vector.into();
                 windows.touch(Touch { contact_point: reading.reference_contact_point_m, tool_origin }, jump);
             } else {
-                let offset = |vertex| offset(state, &self.rest, vertex);
+                let offset = |vertex| self.enricher.offset(state, vertex);
                 windows.hold(&self.enricher, offset, model.timestep_s() as f32);
             }
         }
@@ -140,22 +138,13 @@ impl LiveEnrichment {
             state.write_skin(model, out);
             return;
         }
-        state.write_padded_offsets(model, &mut self.offsets);
-        if n_windows == 1 {
-            self.lay_one(model, state);
+        let reach = if n_windows == 1 && self.enricher.is_sampled() {
+            self.write_one(model, state, out)
         } else {
-            self.lay_all(model, state);
-        }
-        let mut largest = f32x4::ZERO;
-        for (((out, rest), offset), detail) in out.iter_mut().zip(&self.rest).zip(&self.offsets).zip(&self.total) {
-            let detail = f32x4::from(*detail);
-            let [x, y, z, _] = (f32x4::from(*rest) + f32x4::from(*offset) + detail).to_array();
-            *out = [x, y, z];
-            largest = largest.fast_max(detail.abs());
-        }
-        let reach = vector(&largest.to_array()).norm();
+            self.write_all(model, state, out)
+        };
         for (reading, solid) in state.tools().iter().zip(&model.solids).filter(|(r, _)| r.present && reach > 0.0) {
-            let coarse = |v: usize| vector(&self.rest[v]) + vector(&self.offsets[v]);
+            let coarse = |v: usize| V3::from(state.skin.vertex(v));
             keep_clear(solid, &placement(&reading.proxy), (state.skin.boxes(), reach), coarse, out);
         }
     }
@@ -175,14 +164,40 @@ impl LiveEnrichment {
         window.gain
     }
 
-    fn lay_one(&mut self, model: &Model, state: &State) {
-        let Some(slot) = self.windows().next() else { return };
-        let mut total = std::mem::take(&mut self.total);
-        let gain = self.lay(slot, model, state, &mut total);
-        if gain < 1.0 {
-            total.iter_mut().for_each(|d| *d = d.map(|c| c * gain));
+    /// The skin with a single window's detail, in one pass; the largest detail \[m\].
+    fn write_one(&mut self, model: &Model, state: &State, out: &mut [[f32; 3]]) -> f32 {
+        let Some(slot) = self.windows().next() else { return 0.0 };
+        let Some(window) = self.tools[slot / 2].slot_mut(slot) else { return 0.0 };
+        let bounds = window.share_bounds(state.tick(), model.timestep_s() as f32 / HAND_OVER_S);
+        let (mut largest, gain) = (f32x4::ZERO, f32x4::splat(window.gain));
+        let write = |group: usize, detail: &[Node; LANES]| {
+            let [x, y, z]: [[f32; LANES]; 3] = std::array::from_fn(|k| state.skin.group(k, group).to_array());
+            for (lane, (out, detail)) in out[group * LANES..].iter_mut().zip(detail).enumerate() {
+                let detail = gain * f32x4::from(*detail);
+                let [px, py, pz, _] = (f32x4::new([x[lane], y[lane], z[lane], 0.0]) + detail).to_array();
+                *out = [px, py, pz];
+                largest = largest.fast_max(detail.abs());
+            }
+        };
+        let trust = self.enricher.sample_within(bounds, (model, state), &window.touch, &mut self.scratch, write);
+        window.laid = Some((trust.unwrap_or(Trust::NONE), state.tick()));
+        if trust.is_none() {
+            state.write_skin(model, out);
         }
-        self.total = total;
+        vector(&largest.to_array()).norm()
+    }
+
+    /// The skin with the detail of all windows; the largest detail \[m\].
+    fn write_all(&mut self, model: &Model, state: &State, out: &mut [[f32; 3]]) -> f32 {
+        state.write_padded_offsets(model, &mut self.offsets);
+        self.lay_all(model, state);
+        state.write_skin(model, out);
+        let mut largest = 0.0_f32;
+        for (out, detail) in out.iter_mut().zip(&self.total) {
+            (0..3).for_each(|k| out[k] += detail[k]);
+            largest = largest.max(vector(detail).norm_squared());
+        }
+        largest.sqrt()
     }
 
     /// `d = sum_a g_a h_a d_a / max(sum_a g_a h_a, max_a h_a)` with gains `g` and closeness `h`.
@@ -262,9 +277,4 @@ impl ToolWindows {
             *self = Self { current: None, leaving: self.current };
         }
     }
-}
-
-/// How far a vertex is from where it rests \[m\].
-fn offset(state: &State, rest: &[Node], vertex: usize) -> f32 {
-    (crate::contact::V3::from(state.skin.vertex(vertex)) - vector(&rest[vertex])).norm()
 }

@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
+use super::groups::Planar;
+use crate::embedding::SkinPositions;
 use crate::lanes::{F, LANES, Node};
 
 /// Where a tool touches.
@@ -13,13 +15,51 @@ pub struct Touch {
     pub tool_origin: Point3<f64>,
 }
 
+/// Offsets of the coarse skin from rest, `[n_skin]` \[m\].
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Offsets<'a> {
+    /// As they are.
+    Padded(&'a [Node]),
+    /// Deformed less rest positions: what a running simulation has at hand.
+    Between(&'a SkinPositions, &'a Planar),
+}
+
+impl Offsets<'_> {
+    #[inline(always)]
+    fn of(&self, vertex: usize) -> Vector3<f32> {
+        match self {
+            Self::Padded(offsets) => vector(&offsets[vertex]),
+            Self::Between(deformed, rest) => {
+                let (group, lane) = (vertex / LANES, vertex % LANES);
+                let rest = Vector3::from_fn(|k, _| bytemuck::cast_ref::<F, [f32; LANES]>(&rest.axis(k)[group])[lane]);
+                Vector3::from(deformed.vertex(vertex)) - rest
+            }
+        }
+    }
+
+    /// Of sixteen vertices; what lies beyond the last one means nothing.
+    #[inline(always)]
+    pub(crate) fn group(&self, group: usize) -> [Node; LANES] {
+        match self {
+            Self::Padded(offsets) => {
+                let all = &offsets[group * LANES..];
+                std::array::from_fn(|lane| all.get(lane).copied().unwrap_or_default())
+            }
+            Self::Between(deformed, rest) => {
+                let [x, y, z]: [[f32; LANES]; 3] =
+                    std::array::from_fn(|k| (deformed.group(k, group) - rest.axis(k)[group]).to_array());
+                std::array::from_fn(|lane| [x[lane], y[lane], z[lane], 0.0])
+            }
+        }
+    }
+}
+
 /// The coarse state, and the place of one contact.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Situation<'a> {
     /// Displacements of free nodes, in internal order \[m\].
     pub(crate) displacements: &'a [Node],
-    /// Offsets of the coarse skin from rest, `[n_skin]` \[m\].
-    pub(crate) offsets: &'a [Node],
+    pub(crate) offsets: Offsets<'a>,
     /// Coordinates of skin vertices around the contact point, `[groups][axis]` \[m\].
     pub(crate) layout: &'a [[F; 2]],
     /// Contact point on the reference skin \[m\].
@@ -40,7 +80,7 @@ impl Situation<'_> {
     /// Offset of a vertex from rest \[m\].
     #[inline(always)]
     pub(crate) fn offset(&self, vertex: usize) -> Vector3<f32> {
-        vector(&self.offsets[vertex])
+        self.offsets.of(vertex)
     }
 }
 
