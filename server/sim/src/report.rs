@@ -41,6 +41,8 @@ pub struct ToolReading {
     pub contact_point_m: Point3<f64>,
     /// The same point pulled back to the reference skin \[m\].
     pub reference_contact_point_m: Point3<f64>,
+    /// Whether both points are of this tick.
+    pub contact_point_is_new: bool,
     /// Pose of the proxy.
     pub proxy: Isometry3<f64>,
     /// Sequence number of the newest pose.

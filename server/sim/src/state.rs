@@ -239,6 +239,7 @@ fn absent_reading() -> ToolReading {
         contact_force_n: Vector3::zeros(),
         contact_point_m: Point3::origin(),
         reference_contact_point_m: Point3::origin(),
+        contact_point_is_new: false,
         proxy: Isometry3::identity(),
         pose_sequence: 0,
         pose_source_time_ns: 0,

@@ -170,9 +170,10 @@ fn find_contacts(model: &Model, state: &State, workspace: &mut Workspace, report
         let first_row = workspace.rows.rows.len();
         let velocity = |arm: V3| at_arm(&twist, lever, &arm);
         report.dropped_contacts += workspace.rows.select(&model.embedding, &state.v, candidates, velocity, &selection);
-        let touches = workspace.rows.rows[first_row..].iter().any(|r| r.contact.normal_force > 0.0 || r.gap <= 0.0);
-        if let Some(point) = workspace.contact_points.get_mut(body).filter(|_| touches) {
-            *point = contact_point(&search, &workspace.detector);
+        // A row that is only predicted may push in this very solve.
+        let may_touch = workspace.rows.rows.len() > first_row;
+        if let Some(point) = workspace.contact_points.get_mut(body) {
+            *point = if may_touch { contact_point(&search, &workspace.detector) } else { None };
         }
     }
     predict_rows(model, &mut workspace.rows, &workspace.motions);

@@ -161,7 +161,9 @@ fn write_readings(model: &Model, input: &TickInput<'_>, state: &mut State, works
         reading.sliding = sliding;
         reading.saturated = proxy.saturated;
         reading.placements = track.placements;
-        if let Some(point) = workspace.contact_points[index].filter(|_| n_contacts > 0) {
+        let point = workspace.contact_points[index].filter(|_| n_contacts > 0);
+        reading.contact_point_is_new = point.is_some();
+        if let Some(point) = point {
             reading.contact_point_m = Point3::from(point.deformed.cast::<f64>());
             reading.reference_contact_point_m = Point3::from(point.reference.cast::<f64>());
         }

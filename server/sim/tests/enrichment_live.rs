@@ -155,6 +155,39 @@ fn two_tools_share_the_skin() {
 }
 
 #[test]
+fn windows_come_and_go_without_a_jump() {
+    let mut it = Enriched::new(2);
+    let away = Point3::new(0.05, 0.03, 0.3);
+    let detail = |it: &Enriched| -> Vec<[f32; 3]> {
+        let coarse = it.coarse();
+        it.skin.iter().zip(coarse).map(|(s, c)| std::array::from_fn(|k| s[k] - c[k])).collect()
+    };
+    // The first tool rests in the skin; the second comes, goes, and comes again elsewhere while its window is still held.
+    let second = |k: i32| match k {
+        400..600 => deep(0.065, 0.04, 0.003 * f64::from(k - 400) / 200.0),
+        650..850 => deep(0.065, 0.022, 0.003 * f64::from(k - 650) / 200.0),
+        _ => away,
+    };
+    let (mut before, mut coarse_before) = (detail(&it), it.coarse());
+    let (mut most, mut largest) = ((0.0_f64, 0), 0.0_f64);
+    for k in 0..1100 {
+        it.tick(&[deep(0.05, 0.03, 0.004 * (f64::from(k) / 300.0).min(1.0)), second(k)]);
+        let (now, coarse_now) = (detail(&it), it.coarse());
+        let alone = apart(&now, &before) - 2.0 * apart(&coarse_now, &coarse_before);
+        most = if alone > most.0 { (alone, k) } else { most };
+        largest = largest.max(it.detail());
+        for (tool, reading) in it.run.state.tools().iter().enumerate().filter(|(_, r)| r.in_contact) {
+            let apart = (reading.contact_point_m - Point3::from(reading.proxy.translation.vector)).norm();
+            assert!(reading.contact_point_is_new && apart < 1.5 * RADIUS, "tick {k}, tool {tool}: {apart}");
+        }
+        (before, coarse_before) = (now, coarse_now);
+    }
+    println!("largest change of its own {:.0} um of {:.2} mm, tick {}", 1e6 * most.0, 1e3 * largest, most.1);
+    // What the tool kept clear comes back in the tick in which it is taken away.
+    assert!(most.0 < 0.1 * largest, "{most:?} of {largest}");
+}
+
+#[test]
 fn detail_never_pushes_the_skin_into_the_tool() {
     let mut it = Enriched::new(1);
     let deepest = |skin: &[[f32; 3]], centre: Point3<f64>| {

@@ -23,7 +23,7 @@ const KNOWN: usize = 8;
 /// Entry of a vertex that a map does not reach.
 const UNREACHED: i16 = i16::MIN;
 /// Coordinate of a vertex that a map does not reach, in units of its radius.
-const FAR: f32 = 1e6;
+pub(crate) const FAR: f32 = 1e6;
 
 /// How a skin is laid out around a contact point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -314,8 +314,9 @@ fn turn(
     let (mut cos, mut sin) = (0.0, 0.0);
     for &neighbour in neighbours {
         let edge = positions[neighbour] - positions[vertex];
-        let here = Vector2::new(edge.dot(&frame.tau), edge.dot(&frame.theta)).normalize();
-        let there = (map[neighbour]? - centre).normalize();
+        let here = Vector2::new(edge.dot(&frame.tau), edge.dot(&frame.theta)).try_normalize(0.0);
+        let there = (map[neighbour]? - centre).try_normalize(0.0);
+        let (Some(here), Some(there)) = (here, there) else { continue };
         cos += there.dot(&here);
         sin += there.perp(&here);
     }

@@ -211,6 +211,7 @@ impl Enricher {
         let situation = situation(displacements, offsets, layout, &place, touch);
         let mut trust = self.correlation.weigh(&situation, kernel, weights);
         trust.share = if self.options.fade { trust.share.clamp(least, most) } else { 1.0 };
+        trust.confidence = trust.confidence.min(trust.share);
         Some((place, trust))
     }
 

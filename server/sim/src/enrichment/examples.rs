@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::charts::Charts;
+use super::charts::{Charts, FAR};
 use super::enricher::{EnricherError, situation};
 use super::situation::{Offsets, Situation, Touch};
 use super::surface::{Place, Surface};
@@ -49,7 +49,7 @@ impl SeenExamples {
             let mut offsets = vec![[0.0; 4]; model.n_skin()];
             state.write_padded_offsets(model, &mut offsets);
             let place = surface.place(&touch.contact_point);
-            let mut layout = vec![[F::ZERO; 2]; surface.groups().n()];
+            let mut layout = vec![[F::splat(FAR); 2]; surface.groups().n()];
             if let Some(chart) = charts.at(&place) {
                 charts.lay_out(&chart, surface, &mut layout);
             }

@@ -24,7 +24,9 @@ const HAND_OVER_S: f32 = 0.05;
 const JUMP_CELLS: f64 = 0.25;
 /// A held window ends when the skin under it has gone back to this share of its offset at release ...
 const RECOVERED: f32 = 0.02;
-/// ... and has stayed there for so long: it swings \[s\].
+/// ... or moves more slowly than this, as it may rest elsewhere \[m/s\] ...
+const STILL_M_PER_S: f32 = 1e-4;
+/// ... and has done so for so long: it swings \[s\].
 const RECOVERED_S: f32 = 0.1;
 /// Least share of a window where its chart does not reach, so that somebody owns every vertex.
 const LEAST_CLOSENESS: f32 = 1e-3;
@@ -44,8 +46,9 @@ struct Window {
 #[derive(Debug, Clone, Copy)]
 struct Released {
     vertex: usize,
-    /// Of the vertex at release \[m\].
-    offset: f32,
+    /// Offset of the vertex at release, and a tick ago \[m\].
+    at_release: f32,
+    before: f32,
     /// How long it has been back \[s\].
     recovered_s: f32,
 }
@@ -65,8 +68,8 @@ pub struct LiveEnrichment {
     tools: Vec<ToolWindows>,
     offsets: Vec<Node>,
     detail: Vec<Node>,
-    /// Shares of the windows at each vertex: sum and largest.
-    shares: Vec<[f32; 2]>,
+    /// Sum of the windows' shares at each vertex.
+    shares: Vec<f32>,
     total: Vec<Node>,
 }
 
@@ -79,7 +82,7 @@ impl LiveEnrichment {
             tools: vec![ToolWindows::default(); model.n_tools()],
             offsets: vec![[0.0; 4]; n_skin],
             detail: vec![[0.0; 4]; n_skin],
-            shares: vec![[0.0; 2]; n_skin],
+            shares: vec![0.0; n_skin],
             total: vec![[0.0; 4]; n_skin],
             enricher,
         }
@@ -115,16 +118,18 @@ impl LiveEnrichment {
     pub fn follow(&mut self, model: &Model, state: &State) {
         let step = model.timestep_s() as f32 / HAND_OVER_S;
         let jump = JUMP_CELLS * f64::from(model.cell_size);
+        let is_alone = self.windows().count() == 0;
         for (tool, reading) in state.tools().iter().enumerate() {
             let windows = &mut self.tools[tool];
             if let Some(current) = &mut windows.current {
                 current.gain = (current.gain + step).min(1.0);
             }
             windows.leaving = windows.leaving.map(|w| Window { gain: w.gain - step, ..w }).filter(|w| w.gain > 0.0);
-            if reading.in_contact {
+            if reading.contact_point_is_new {
                 let tool_origin = reading.proxy.translation.vector.into();
-                windows.touch(Touch { contact_point: reading.reference_contact_point_m, tool_origin }, jump);
-            } else {
+                let touch = Touch { contact_point: reading.reference_contact_point_m, tool_origin };
+                windows.touch(touch, jump, is_alone);
+            } else if !reading.in_contact {
                 let offset = |vertex| self.enricher.offset(state, vertex);
                 windows.hold(&self.enricher, offset, model.timestep_s() as f32);
             }
@@ -200,27 +205,30 @@ impl LiveEnrichment {
         largest.sqrt()
     }
 
-    /// `d = sum_a g_a h_a d_a / max(sum_a g_a h_a, max_a h_a)` with gains `g` and closeness `h`.
+    /// `d = min(1, sum_a g_a) sum_a g_a h_a d_a / sum_a g_a h_a` with gains `g` and closeness `h`: windows come and go without a
+    /// jump.
     fn lay_all(&mut self, model: &Model, state: &State) {
         self.total.fill([0.0; 4]);
-        self.shares.fill([0.0; 2]);
+        self.shares.fill(0.0);
+        let mut gains = 0.0;
         let mut detail = std::mem::take(&mut self.detail);
         for slot in 0..2 * self.tools.len() {
             if self.tools[slot / 2].slot(slot).is_none() {
                 continue;
             }
             let gain = self.lay(slot, model, state, &mut detail);
+            gains += gain;
             let sums = self.total.iter_mut().zip(&mut self.shares).zip(&detail);
-            for (vertex, ((total, [sum, largest]), detail)) in sums.enumerate() {
+            for (vertex, ((total, sum), detail)) in sums.enumerate() {
                 let closeness = self.enricher.closeness(&self.scratch, vertex).max(LEAST_CLOSENESS);
                 (0..3).for_each(|k| total[k] += gain * closeness * detail[k]);
                 *sum += gain * closeness;
-                *largest = largest.max(closeness);
             }
         }
         self.detail = detail;
-        for (total, [sum, largest]) in self.total.iter_mut().zip(&self.shares) {
-            *total = total.map(|c| c / sum.max(*largest));
+        let all = gains.min(1.0);
+        for (total, sum) in self.total.iter_mut().zip(&self.shares) {
+            *total = total.map(|c| all * c / sum.max(f32::MIN_POSITIVE));
         }
     }
 }
@@ -253,15 +261,19 @@ impl ToolWindows {
         self.current.and_then(|w| w.laid).map_or(0.0, |(trust, _)| trust.confidence)
     }
 
-    fn touch(&mut self, touch: Touch, jump: f64) {
+    /// `is_alone` if no tool has a window: then there is nobody to take over from.
+    fn touch(&mut self, touch: Touch, jump: f64, is_alone: bool) {
         let is_elsewhere = |w: &Window| (w.touch.contact_point - touch.contact_point).norm() > jump;
         match &mut self.current {
             Some(current) if !is_elsewhere(current) => (current.touch, current.released) = (touch, None),
             Some(current) => {
-                self.leaving = Some(*current);
-                *current = Window::new(touch, 1.0 - current.gain);
+                // Of two that should leave, the one that shows more does.
+                if self.leaving.is_none_or(|l| l.gain <= current.gain) {
+                    self.leaving = Some(*current);
+                }
+                *current = Window::new(touch, 0.0);
             }
-            None => self.current = Some(Window::new(touch, 1.0)),
+            None => self.current = Some(Window::new(touch, if is_alone { 1.0 } else { 0.0 })),
         }
     }
 
@@ -269,9 +281,11 @@ impl ToolWindows {
         let Some(current) = &mut self.current else { return };
         let released = current.released.get_or_insert_with(|| {
             let vertex = enricher.nearest_vertex(&current.touch);
-            Released { vertex, offset: offset(vertex), recovered_s: 0.0 }
+            Released { vertex, at_release: offset(vertex), before: f32::INFINITY, recovered_s: 0.0 }
         });
-        let is_back = offset(released.vertex) <= RECOVERED * released.offset;
+        let now = offset(released.vertex);
+        let is_back = now <= RECOVERED * released.at_release || (now - released.before).abs() <= STILL_M_PER_S * dt;
+        released.before = now;
         released.recovered_s = if is_back { released.recovered_s + dt } else { 0.0 };
         if released.recovered_s >= RECOVERED_S {
             *self = Self { current: None, leaving: self.current };

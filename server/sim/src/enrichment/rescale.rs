@@ -73,7 +73,7 @@ fn shares(distance: f64, radius: f64) -> [(usize, f64); 2] {
     if x >= 1.0 {
         return [(KNOTS.len(), 1.0), (KNOTS.len(), 0.0)];
     }
-    let upper = KNOTS.partition_point(|k| *k <= x).min(KNOTS.len() - 1);
+    let upper = KNOTS.partition_point(|k| *k <= x).clamp(1, KNOTS.len() - 1);
     let share = (x - KNOTS[upper - 1]) / (KNOTS[upper] - KNOTS[upper - 1]);
     [(upper - 1, 1.0 - share), (upper, share)]
 }

@@ -84,7 +84,7 @@ impl Ssh12 {
 
     fn kernel(&self, x: f32) -> f32 {
         let g = (-(x / self.sigma).powi(2)).exp();
-        if x >= 2.0 * self.sigma { 0.0 } else { (g - AT_END) / (1.0 - AT_END) }
+        if x.abs() >= 2.0 * self.sigma { 0.0 } else { (g - AT_END) / (1.0 - AT_END) }
     }
 }
 

@@ -25,7 +25,15 @@ pub(in crate::commands) fn read(
                 command(config, kind, &path, given)
             );
         }
-        Ok(Database::read(&path, Some(&setup.scene_hash))?)
+        let database = Database::read(&path, Some(&setup.scene_hash))?;
+        anyhow::ensure!(
+            database.about.kind == kind,
+            "{}: is a database of kind {}, one of kind {} is needed here",
+            path.display(),
+            database.about.kind.name(),
+            kind.name()
+        );
+        Ok(database)
     };
     Ok((read(&args.training, JobKind::Training)?, read(&args.held_out, JobKind::Evaluation)?))
 }
