@@ -111,7 +111,9 @@ pub fn at_start(config: &Config, model: &Arc<Model>) -> Result<Option<(Enrichmen
 /// A device or a pipe would be read without end.
 fn check_file(path: &Path) -> Result<(), EnrichmentError> {
     let failed = |problem: String| EnrichmentError::File { path: path.to_owned(), problem };
-    let metadata = fs::metadata(path).map_err(|e| failed(format!("cannot be read: {e}")))?;
+    let place = if path.is_relative() { "; the path begins where this program was started" } else { "" };
+    let unreadable = |e: std::io::Error| failed(format!("cannot be read: {e}{place}"));
+    let metadata = fs::metadata(path).map_err(unreadable)?;
     if !metadata.is_file() {
         return Err(failed("is no file".into()));
     }

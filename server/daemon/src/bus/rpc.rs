@@ -107,7 +107,11 @@ impl Worker {
     fn activate(&mut self, activation: Activation) {
         let Activation { query, live, n_examples } = activation;
         let key = query.key_expr().as_str().to_owned();
-        let content = self.order(Command::Activate(live)).and_then(|o| json(&wire::activate_reply(&o, n_examples)));
+        let outcome = self.order(Command::Activate(live));
+        if let Ok(outcome) = &outcome {
+            tracing::info!("{n_examples} examples enrich the skin from tick {} on", outcome.tick);
+        }
+        let content = outcome.and_then(|o| json(&wire::activate_reply(&o, n_examples)));
         self.replies.send(query, content.map(|json| Content::json(key, json)));
     }
 
