@@ -1,10 +1,9 @@
 //! The skin at rest, as enrichment asks for it: the nearest vertex, the frame at a contact point.
 
 use nalgebra::{Point3, Vector3};
-use plica_geometry::{ContactFrame, ReferenceSkin, Skin, SurfacePoint, TriangleIdx, VertexIdx};
+use plica_geometry::{CLUSTER_SIZE, ContactFrame, ReferenceSkin, Skin, SurfacePoint, TriangleIdx, VertexIdx};
 
 use super::groups::{Groups, Planar};
-use crate::lanes::{F, LANES, dot};
 
 /// Tables of the skin at rest.
 #[derive(Debug, Clone)]
@@ -12,6 +11,8 @@ pub(crate) struct Surface {
     reference: ReferenceSkin,
     /// Triangles around each vertex.
     fans: Vec<Vec<TriangleIdx>>,
+    /// Of each cluster of vertices, low and high corner \[m\].
+    boxes: Vec<[Point3<f64>; 2]>,
     rest: Planar,
     normals: Planar,
     axes: [Vector3<f64>; 2],
@@ -31,6 +32,7 @@ impl Surface {
         let (reference, groups) = (ReferenceSkin::new(skin), Groups::new(skin.n_vertices()));
         Self {
             fans: fans(skin),
+            boxes: skin.positions().chunks(CLUSTER_SIZE).map(bounds).collect(),
             rest: Planar::new(groups, |v| skin.positions()[v].coords.into()),
             normals: Planar::new(groups, |v| reference.vertex_normals()[v].into()),
             reference,
@@ -73,21 +75,34 @@ impl Surface {
         Place { corners, frame: self.reference.frame(&point, &self.axes), point }
     }
 
-    /// The vertex nearest to a point, sixteen at a time.
+    /// The vertex nearest to a point: clusters whose boxes are farther away than what is known are passed over.
     pub(crate) fn nearest(&self, p: &Point3<f64>) -> usize {
-        let p = p.coords.cast::<f32>();
-        let (mut least, mut group) = (F::splat(f32::INFINITY), F::ZERO);
-        for g in 0..self.groups().n() {
-            let d = std::array::from_fn(|k| self.rest.axis(k)[g] - F::splat(p[k]));
-            let squared = dot(d, d);
-            let is_nearer = squared.simd_lt(least);
-            least = least.fast_min(squared);
-            group = is_nearer.bitselect(F::splat(g as f32), group);
+        let squared = |[low, high]: &[Point3<f64>; 2]| (p - p.sup(low).inf(high)).norm_squared();
+        let first = (0..self.boxes.len()).min_by(|a, b| squared(&self.boxes[*a]).total_cmp(&squared(&self.boxes[*b])));
+        let mut best = (f64::INFINITY, 0);
+        self.look_into(first.unwrap_or(0), p, &mut best);
+        for (cluster, bounds) in self.boxes.iter().enumerate() {
+            if squared(bounds) < best.0 {
+                self.look_into(cluster, p, &mut best);
+            }
         }
-        let (least, group) = (least.to_array(), group.to_array());
-        let lane = (1..LANES).fold(0, |best, lane| if least[lane] < least[best] { lane } else { best });
-        (group[lane] as usize * LANES + lane).min(self.n_vertices() - 1)
+        best.1
     }
+
+    fn look_into(&self, cluster: usize, p: &Point3<f64>, best: &mut (f64, usize)) {
+        let first = cluster * CLUSTER_SIZE;
+        for (lane, q) in self.reference.skin().positions()[first..].iter().take(CLUSTER_SIZE).enumerate() {
+            let squared = (p - q).norm_squared();
+            if squared < best.0 {
+                *best = (squared, first + lane);
+            }
+        }
+    }
+}
+
+fn bounds(positions: &[Point3<f64>]) -> [Point3<f64>; 2] {
+    let first = positions[0];
+    positions.iter().fold([first, first], |[low, high], p| [low.inf(p), high.sup(p)])
 }
 
 fn fans(skin: &Skin) -> Vec<Vec<TriangleIdx>> {
@@ -96,4 +111,23 @@ fn fans(skin: &Skin) -> Vec<Vec<TriangleIdx>> {
         corners.iter().for_each(|v| fans[v.index()].push(TriangleIdx::from_index(t)));
     }
     fans
+}
+
+#[cfg(test)]
+mod tests {
+    use plica_geometry::shapes::{Wedge, wedge_skin};
+
+    use super::*;
+
+    #[test]
+    fn the_nearest_vertex_is_nearer_than_all_others() {
+        let surface = Surface::new(&wedge_skin(&Wedge::default(), 3e-3).clustered(), [Vector3::x(), Vector3::y()]);
+        let positions = surface.reference().skin().positions();
+        for k in 0..200 {
+            let share = |n: i32| f64::from(k * n % 101) / 100.0;
+            let p = Point3::new(0.14 * share(17) - 0.01, 0.08 * share(29) - 0.01, 0.05 * share(43) - 0.005);
+            let least = positions.iter().map(|q| (q - p).norm()).fold(f64::INFINITY, f64::min);
+            assert!((positions[surface.nearest(&p)] - p).norm() <= least, "{p}");
+        }
+    }
 }
