@@ -45,7 +45,7 @@ pub use generate::{Watch, run};
 pub use interaction::{Action, Interaction};
 pub use plan::plan;
 pub use random::GENERATOR;
-pub use report::{Report, Run, Solves, Spread, Summary};
+pub use report::{Report, Run, Solves, Spread, Summary, largest, rms};
 pub use sensitivity::{Difference, Force, Sensitivity, Variations, sensitivity};
 pub use setup::{
     AccurateDescription, Approach, DriveOptions, FeatureScales, InteractionSet, PressRanges, RecordedPose, Setup,

@@ -180,15 +180,15 @@ impl Spread {
     }
 }
 
-/// Root of the area-weighted mean of `|v|^2` over the skin.
-pub(crate) fn rms(field: &[[f32; 3]], areas: &[f64]) -> f64 {
+/// Root of the area-weighted mean of `|v|^2` over the skin; `field` and `areas` `[n_skin]`, in the field's unit.
+pub fn rms(field: &[[f32; 3]], areas: &[f64]) -> f64 {
     let squared = |v: &[f32; 3]| v.iter().map(|c| f64::from(*c).powi(2)).sum::<f64>();
     let sum: f64 = field.iter().zip(areas).map(|(v, area)| area * squared(v)).sum();
     (sum / areas.iter().sum::<f64>()).sqrt()
 }
 
-/// Largest `|v|`.
-pub(crate) fn largest(field: &[[f32; 3]]) -> f64 {
+/// Largest `|v|` of a field `[n_skin]`.
+pub fn largest(field: &[[f32; 3]]) -> f64 {
     let squared = |v: &[f32; 3]| v.iter().map(|c| f64::from(*c).powi(2)).sum::<f64>();
     field.iter().map(squared).fold(0.0, f64::max).sqrt()
 }

@@ -5,9 +5,8 @@ use std::sync::Arc;
 
 use anyhow::Context;
 use nalgebra::{Isometry3, Point3, Vector3};
-use plica_geometry::ReferenceSkin;
 use plica_sim::{Model, State};
-use plica_training::{Example, Interaction, Outcome, Setup, Tandem, plan};
+use plica_training::{Example, Interaction, Outcome, Setup, Tandem, largest, plan, rms};
 use serde::Serialize;
 
 use super::isometry;
@@ -114,12 +113,9 @@ fn solve(setup: &Setup, interaction: &Interaction) -> anyhow::Result<Example> {
 }
 
 fn distance(model: &Model, skin: &[[f32; 3]], from: &[[f32; 3]]) -> Distance {
-    let reference = ReferenceSkin::new(&model.description().skin);
-    let areas = reference.vertex_areas();
-    let squared = |i: usize| (0..3).map(|k| f64::from(skin[i][k] - from[i][k]).powi(2)).sum::<f64>();
-    let sum: f64 = (0..skin.len()).map(|i| areas[i] * squared(i)).sum();
-    let worst = (0..skin.len()).map(squared).fold(0.0, f64::max);
-    Distance { rms_m: (sum / areas.iter().sum::<f64>()).sqrt(), worst_m: worst.sqrt() }
+    let between = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|k| a[k] - b[k]);
+    let field: Vec<[f32; 3]> = skin.iter().zip(from).map(between).collect();
+    Distance { rms_m: rms(&field, &model.description().skin.vertex_areas()), worst_m: largest(&field) }
 }
 
 /// The vertex of a skin that is nearest to a point.
