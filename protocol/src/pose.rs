@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::DecodeError;
 use crate::bytes::{Layout, finite, open_exact};
+use crate::keys::check_name;
 
 /// First bytes of a pose.
 pub const MAGIC: [u8; 4] = *b"PLPS";
@@ -114,6 +115,16 @@ impl Pose {
         self.orientation_xyzw = normalised(self.orientation_xyzw)?;
         Ok(self)
     }
+}
+
+/// The gate of [`Pose::checked`] for a pose that did not come over the bus: the normalised orientation `xyzw`.
+///
+/// # Errors
+/// A sentence: the tool's name cannot be part of a key, or the pose is refused.
+pub fn gate(tool: Option<&str>, position_m: [f64; 3], orientation_xyzw: [f64; 4]) -> Result<[f64; 4], String> {
+    tool.map_or(Ok(()), check_name).map_err(|error| error.to_string())?;
+    let pose = Pose { position_m, orientation_xyzw, ..Pose::default() }.checked();
+    pose.map(|pose| pose.orientation_xyzw).map_err(|error| error.to_string())
 }
 
 fn norm(values: &[f64]) -> f64 {

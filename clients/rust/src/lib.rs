@@ -16,7 +16,7 @@
 //!
 //! All calls block, at most for the time-out of [`ClientOptions`]. They work from plain threads and from tokio's
 //! multi-threaded runtime; Zenoh refuses tokio's single-threaded one.
-//! [`trajectory`], [`pattern`] and [`recording`] work without a bus.
+//! [`pattern`] and [`recording`] work without a bus.
 
 mod client;
 mod error;
@@ -29,7 +29,6 @@ mod query;
 mod queue;
 pub mod recording;
 mod subscribe;
-pub mod trajectory;
 
 pub use client::Client;
 pub use error::ClientError;

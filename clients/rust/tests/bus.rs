@@ -6,12 +6,13 @@ mod common;
 use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
-use common::{SmallDaemon, frame, mesh_bytes};
 use plica_client::mesh::{rest_mesh, rest_positions};
 use plica_client::protocol::pose::Pose;
 use plica_client::protocol::rpc::StepReply;
 use plica_client::{Client, ClientError, ClientOptions, PoseSource};
 use serde_json::json;
+
+use common::{SmallDaemon, frame, mesh_bytes};
 
 const LONG: Duration = Duration::from_secs(5);
 

@@ -7,11 +7,12 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use common::SmallDaemon;
 use plica_client::PoseSource;
 use plica_client::recording::{Recorded, read};
 use serde_json::Value;
 use tempfile::TempDir;
+
+use common::SmallDaemon;
 
 fn plica(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_plica"));

@@ -8,11 +8,12 @@ use std::io::{BufRead, BufReader};
 use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
-use common::jobs::{BROKEN, DONE, ENDLESS, ENDS, FAILED};
-use common::{SmallDaemon, mesh_bytes};
 use plica_client::protocol::jobs::{JobFile, JobKind, JobProgress, JobState, JobSubmitRequest};
 use serde_json::Value;
 use tempfile::TempDir;
+
+use common::jobs::{BROKEN, DONE, ENDLESS, ENDS, FAILED};
+use common::{SmallDaemon, mesh_bytes};
 
 fn plica(daemon: &SmallDaemon, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_plica"));

@@ -1,8 +1,8 @@
 //! What the bus can carry.
 
 use plica_protocol::skin::{SkinFlags, SkinHeader};
-
-use crate::config::{Config, PositionFormat};
+use plica_scene::Config;
+use plica_scene::scene::PositionFormat;
 
 /// The transmit queue holds just over this; a larger frame would never arrive.
 pub const MAX_FRAME_BYTES: u64 = 1_000_000;
@@ -50,7 +50,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::config::BUILT_IN_SCENE;
+    use plica_scene::BUILT_IN_SCENE;
 
     #[test]
     fn frames_beyond_a_megabyte_need_sixteen_bits() {

@@ -2,12 +2,11 @@
 
 use std::sync::Arc;
 
+use plica_scene::motion::TimedPose;
 use plica_sim::enrichment::LiveEnrichment;
 use plica_sim::{Model, TickReport};
 
-use crate::motion::TimedPose;
 use crate::realtime::{Frame, Loop, LoopOptions, Ports, Turn, TurnProbe};
-use crate::wire;
 
 /// A loop that is told its poses by time.
 pub struct Replay {
@@ -41,7 +40,7 @@ impl Replay {
         let clock_s = self.core.state().sim_time_s() + 0.5e-6;
         while let Some(timed) = self.poses.get(self.next).filter(|p| p.time_s <= clock_s) {
             // A full queue holds 256 poses of one tick; more of them change nothing, since the newest ones are left out.
-            let _ = self.ports.poses[timed.tool].push(wire::pose_sample(&timed.pose));
+            let _ = self.ports.poses[timed.tool].push(timed.sample);
             self.next += 1;
         }
     }

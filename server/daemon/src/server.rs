@@ -2,23 +2,23 @@
 
 use std::sync::Arc;
 
+use plica_jobs::{DataFolderError, Jobs, Supervision};
 use plica_protocol::keys::Keys;
+use plica_scene::Config;
+use plica_scene::model::{self, SceneModelError};
 use plica_sim::Model;
 
 use crate::bus::{Bus, BusError, BusOptions, Parts, Scene};
-use crate::config::Config;
-use crate::enrichment::{Enrichment, EnrichmentError};
-use crate::jobs::{DataFolderError, Jobs, Supervision};
+use crate::database_loader::{Enrichment, EnrichmentError};
 use crate::limits::{FrameTooLarge, check_frame};
 use crate::realtime::{Grants, Loop, LoopOptions, Running, ThreadOptions, spawn};
-use crate::scene::{self, SceneError};
 
 /// Why a daemon does not start.
 #[derive(Debug, thiserror::Error)]
 pub enum ServerError {
     /// The scene makes no model.
     #[error(transparent)]
-    Scene(#[from] SceneError),
+    Scene(#[from] SceneModelError),
     /// Frames would never arrive.
     #[error(transparent)]
     Frame(#[from] FrameTooLarge),
@@ -60,7 +60,7 @@ impl Server {
         let keys = Keys::new(&options.session).map_err(BusError::from)?;
         let session = Bus::open(options)?;
         let (jobs, supervision) = jobs()?;
-        let model = Arc::new(scene::build(config)?);
+        let model = Arc::new(model::build(config)?);
         check_frame(config, model.n_skin())?;
         let publish = config.object().publish();
         let loop_options = LoopOptions { publish_hz: publish.publish_hz, wrench_hz: publish.wrench_hz, lock_step };

@@ -1,16 +1,13 @@
 //! The one place where wire types become simulation types and back.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
-use plica_protocol::jobs::{Job, JobKind, Progress};
 use plica_protocol::pose::Pose;
 use plica_protocol::rpc::{ActivateReply, ErrorCode, ErrorReply, SnapshotReply, StateReply, StepReply};
 use plica_protocol::skin::{SkinFlags, SkinHeader};
 use plica_protocol::status::{Distribution, ObjectStatus, Realtime, Scheduling, SolverStatus, ToolStatus};
 use plica_protocol::wrench::{Wrench, WrenchFlags};
 use plica_sim::{PoseSample, ToolReading};
-use plica_training::Stage;
 
-use crate::jobs::Standing;
 use crate::realtime::{Frame, Grants, Outcome, Reading, Refusal, Summary, ToolFrame};
 
 /// A pose that has passed the protocol's gate.
@@ -152,46 +149,6 @@ pub fn activate_reply(outcome: &Outcome, n_examples: usize) -> ActivateReply {
         database_generation: outcome.database_generation,
         examples: u32::try_from(n_examples).unwrap_or(u32::MAX),
     }
-}
-
-/// What a job makes.
-pub fn job_kind(kind: JobKind) -> plica_training::JobKind {
-    match kind {
-        JobKind::Training => plica_training::JobKind::Training,
-        JobKind::Evaluation => plica_training::JobKind::Evaluation,
-    }
-}
-
-/// A job: what was asked, where it stands, what its process has said.
-pub fn job(order: &plica_training::Job, standing: &Standing, progress: Option<plica_training::Progress>) -> Job {
-    Job {
-        id: order.id.clone(),
-        client_id: order.client_id.clone(),
-        kind: match order.kind {
-            plica_training::JobKind::Training => JobKind::Training,
-            plica_training::JobKind::Evaluation => JobKind::Evaluation,
-        },
-        scene_name: order.scene_name.clone(),
-        examples: order.examples,
-        seed: order.seed,
-        threads: order.threads.unwrap_or(1),
-        submitted_unix_s: order.submitted_unix_s,
-        state: standing.state,
-        reason: standing.reason.clone(),
-        started_unix_s: standing.started_unix_s,
-        finished_unix_s: standing.finished_unix_s,
-        progress: progress.map(job_progress).unwrap_or_default(),
-    }
-}
-
-fn job_progress(progress: plica_training::Progress) -> Progress {
-    let plica_training::Progress { stage, done, rejected, total, seconds_left } = progress;
-    let stage = match stage {
-        Stage::Interactions => "interactions",
-        Stage::Examples => "examples",
-        Stage::Database => "database",
-    };
-    Progress { stage: Some(stage.to_owned()), done, rejected, total, seconds_left }
 }
 
 /// Why an order was not obeyed.

@@ -7,13 +7,14 @@ mod common;
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-use common::{Misbehaviour, TICKS_FOR_A_WHILE, TestServer, pose, wait_for};
 use plica_client::protocol::pose::Pose;
 use plica_client::protocol::rpc::{SnapshotReply, StateReply, StepPose};
 use plica_client::protocol::wrench::Wrench;
 use plica_client::{Client, ClientError};
 use serde_json::{Value, json};
 use zenoh::Wait;
+
+use common::{Misbehaviour, TICKS_FOR_A_WHILE, TestServer, pose, wait_for};
 
 const SECOND: Duration = Duration::from_secs(1);
 

@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 
 use plica_client::protocol::pose::Pose;
 use plica_client::{Client, ClientError, ClientOptions};
-use plicad::bus::BusOptions;
-use plicad::config::Config;
-use plicad::server::Server;
+use plica_daemon::bus::BusOptions;
+use plica_daemon::server::Server;
+use plica_scene::Config;
 use serde_json::json;
 
 const SCENE: &str = r#"

@@ -7,11 +7,11 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use nalgebra::{Isometry3, Point3, Vector3};
+use plica_daemon::realtime::{Command, Loop, LoopOptions, Returned, StageTimer, Turn};
+use plica_scene::Config;
+use plica_scene::model;
 use plica_sim::enrichment::{Enricher, Examples, LiveEnrichment, Touch};
 use plica_sim::{Model, PoseSample};
-use plicad::config::Config;
-use plicad::realtime::{Command, Loop, LoopOptions, Returned, StageTimer, Turn};
-use plicad::scene;
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
@@ -40,7 +40,7 @@ fn examples(model: &Model) -> Examples {
 #[test]
 fn ten_thousand_turns_allocate_and_free_nothing() {
     let config = Config::built_in().unwrap();
-    let model = Arc::new(scene::build(&config).unwrap());
+    let model = Arc::new(model::build(&config).unwrap());
     let enricher = Arc::new(Enricher::new(&model, &examples(&model), config.enrichment().options).unwrap());
     let options = LoopOptions { publish_hz: 1000.0, wrench_hz: 1000.0, lock_step: false };
     let (mut core, mut ports) = Loop::new(Arc::clone(&model), options);

@@ -7,6 +7,7 @@ mod assemble;
 mod error;
 mod groups;
 mod msh;
+mod obj;
 mod vtu;
 
 use std::path::Path;
@@ -14,6 +15,7 @@ use std::path::Path;
 use crate::hex_mesh::HexMesh;
 pub use error::{ImportError, Place};
 pub use groups::{Group, Groups};
+pub use obj::read_obj_parts;
 
 use error::{Fault, fault};
 

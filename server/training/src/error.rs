@@ -8,6 +8,9 @@ use plica_accurate::{SolidError, SolveError};
 use plica_geometry::EmbeddingError;
 use plica_sim::ModelError;
 
+/// Exit code of a process whose job was interrupted: finished examples are kept.
+pub const INTERRUPTED: u8 = 75;
+
 /// Why there are no interactions.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {

@@ -37,7 +37,7 @@ pub use database::{
     About, CONTACT_POINT, Database, DatabaseError, FORMAT, FORMAT_VERSION, JobKind, METADATA_KEY, SOLVER_VERSION,
     TANDEM_VERSION, versions,
 };
-pub use error::{BuildError, PlanError, TrainingError};
+pub use error::{BuildError, INTERRUPTED, PlanError, TrainingError};
 pub use example::{Example, Outcome, Reason, Record, Rejection, SettlingRecord};
 pub use files::write_atomically;
 pub use folder::{Folder, Job, Progress, Stage};

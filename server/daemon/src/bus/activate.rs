@@ -15,7 +15,7 @@ use zenoh::query::Query;
 use super::replies::Replies;
 use super::rpc::{Request, refused};
 use super::{BusError, Shared, spawn};
-use crate::enrichment::Ready;
+use crate::database_loader::Ready;
 
 /// Requests that may wait: none but the next.
 const QUEUE: usize = 1;

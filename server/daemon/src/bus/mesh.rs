@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use plica_geometry::export::glb_bytes;
+use plica_geometry::{DisplaySurface, vertex_normals_into};
 use plica_protocol::ENCODING_GLB;
 use plica_protocol::chunk::{ChunkHeader, offset_of, piece};
 use plica_protocol::rpc::ErrorReply;
@@ -14,7 +15,6 @@ use super::guard::guarded;
 use super::replies::{Content, Replies};
 use super::skin::unknown_object;
 use super::{BusError, Shared};
-use crate::surface::{Surface, normals_into};
 
 pub(super) fn declare(shared: &Arc<Shared>, replies: Replies) -> Result<Queryable<()>, BusError> {
     let mesh = Mesh::new(shared);
@@ -37,9 +37,9 @@ struct Mesh {
 impl Mesh {
     fn new(shared: &Shared) -> Self {
         let skin = &shared.model.description().skin;
-        let surface = Surface::new(skin);
+        let surface = DisplaySurface::new(skin);
         let mut normals = vec![[0.0; 3]; surface.rest.len()];
-        normals_into(&surface.triangles, &surface.rest, &mut normals);
+        vertex_normals_into(&surface.triangles, &surface.rest, &mut normals);
         let glb = glb_bytes(&surface.rest, &normals, skin.triangles());
         let sha256 = Sha256::digest(&glb).iter().map(|byte| format!("{byte:02x}")).collect();
         Self { key: shared.keys.mesh(&shared.scene.object), glb, sha256 }

@@ -7,9 +7,11 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use plica_geometry::{DisplaySurface, vertex_normals_into};
 use plica_protocol::rpc::{ErrorCode, ErrorReply};
 use plica_protocol::status::FRAME_REFUSED;
 use plica_protocol::{ENCODING_BYTES, skin};
+use plica_scene::scene::PositionFormat;
 use zenoh::Wait;
 use zenoh::bytes::Encoding;
 use zenoh::pubsub::Publisher;
@@ -19,9 +21,7 @@ use zenoh::query::{Query, Queryable};
 use super::guard::guarded;
 use super::replies::{Content, Replies};
 use super::{BusError, Shared, spawn};
-use crate::config::PositionFormat;
 use crate::realtime::{Frame, FramePort};
-use crate::surface::{Surface, normals_into};
 use crate::wire;
 
 /// Questions that may wait.
@@ -183,14 +183,14 @@ pub(super) fn unknown_object(shared: &Shared, key: &str) -> Option<ErrorReply> {
 /// Turns frames into bytes.
 struct Encoder {
     format: PositionFormat,
-    surface: Surface,
+    surface: DisplaySurface,
     normals: Option<Vec<[f32; 3]>>,
     n_bytes: usize,
 }
 
 impl Encoder {
     fn new(shared: &Shared) -> Self {
-        let surface = Surface::new(&shared.model.description().skin);
+        let surface = DisplaySurface::new(&shared.model.description().skin);
         let with_normals = shared.scene.publish.normals;
         let normals = with_normals.then(|| vec![[0.0; 3]; surface.rest.len()]);
         Self { format: shared.scene.publish.format, surface, normals, n_bytes: 0 }
@@ -202,7 +202,7 @@ impl Encoder {
             return None;
         }
         if let Some(normals) = &mut self.normals {
-            normals_into(&self.surface.triangles, &frame.positions, normals);
+            vertex_normals_into(&self.surface.triangles, &frame.positions, normals);
         }
         let header = wire::skin_header(frame, sequence);
         let mut bytes = Vec::with_capacity(self.n_bytes);

@@ -7,7 +7,7 @@ use plica_sim::{Model, NoProbe, State, TickReport};
 use triple_buffer::Input;
 
 use super::cadence::Cadence;
-use super::detail::Detail;
+use super::enrichment::Detail;
 use super::{Frame, Reading, Statistics, ToolFrame, TurnProbe, Waker};
 
 /// How often the frame of a sleeping object is repeated.

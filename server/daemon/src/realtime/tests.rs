@@ -5,12 +5,12 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 
 use nalgebra::Isometry3;
+use plica_scene::Config;
+use plica_scene::model;
 use plica_sim::enrichment::{Enricher, EnrichmentOptions, Examples, LiveEnrichment, Touch};
 use plica_sim::{NoProbe, PoseSample, ToolPose};
 
 use super::*;
-use crate::config::Config;
-use crate::scene;
 
 const SCENE: &str = r#"
 [objects.block]
@@ -26,7 +26,7 @@ coupling = "rigid"
 
 fn start(lock_step: bool) -> (Loop, Ports) {
     let config = Config::parse(Path::new("block.toml"), SCENE).unwrap();
-    let model = Arc::new(scene::build(&config).unwrap());
+    let model = Arc::new(model::build(&config).unwrap());
     Loop::new(model, LoopOptions { publish_hz: 90.0, wrench_hz: 500.0, lock_step })
 }
 

@@ -9,12 +9,13 @@ use std::time::{Duration, Instant};
 
 use plica_client::protocol::pose::Pose;
 use plica_client::{Client, ClientOptions};
-use plicad::bus::BusOptions;
-use plicad::config::Config;
-use plicad::motion::TimedPose;
-use plicad::replay::Replay;
-use plicad::scene;
-use plicad::server::Server;
+use plica_daemon::bus::BusOptions;
+use plica_daemon::replay::Replay;
+use plica_daemon::server::Server;
+use plica_daemon::wire;
+use plica_scene::Config;
+use plica_scene::model;
+use plica_scene::motion::TimedPose;
 use zenoh::Wait;
 
 /// How many ticks count as a while.
@@ -163,8 +164,9 @@ pub(crate) fn pose_on_path(tick: u64) -> Pose {
 
 /// Positions after each tick of the path, as `simulate` computes them.
 pub(crate) fn replay_bytes(n_ticks: u64) -> Vec<Vec<u8>> {
-    let model = Arc::new(scene::build(&config()).unwrap());
-    let timed = |tick: u64| TimedPose { time_s: 1e-3 * tick as f64, tool: 0, pose: pose_on_path(tick) };
+    let model = Arc::new(model::build(&config()).unwrap());
+    let timed =
+        |tick: u64| TimedPose { time_s: 1e-3 * tick as f64, tool: 0, sample: wire::pose_sample(&pose_on_path(tick)) };
     let mut replay = Replay::new(model, (0..n_ticks).map(timed).collect());
     let mut frames = Vec::new();
     for _ in 0..n_ticks {

@@ -4,7 +4,7 @@ use anyhow::Context;
 use plica_client::Client;
 use plica_client::mesh::rest_mesh;
 use plica_client::pattern::Path;
-use plica_client::trajectory::Terrain;
+use plica_trajectory::Terrain;
 
 use super::choose;
 use crate::args::Motion;

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use plica_client::pattern::Pattern;
-use plica_client::trajectory::{self, TrackedPose, fit_above, fitted_depth_m};
 use plica_client::{Client, PoseSource, Subscription, WrenchMessage};
+use plica_trajectory::{self as trajectory, TrackedPose, fit_above, fitted_depth_m};
 use serde_json::json;
 
 use super::Stop;
@@ -99,7 +99,7 @@ impl Sources {
 }
 
 fn recorded(file: &Path, probe: &Probe, plan: &Plan) -> anyhow::Result<Vec<TrackedPose>> {
-    let mut poses = trajectory::read(file)?;
+    let mut poses = trajectory::read(file, plica_client::protocol::pose::gate)?;
     if probe.fit {
         let depth_m = probe.motion.depth_m.unwrap_or_else(|| fitted_depth_m(&plan.terrain));
         fit_above(&mut poses, &plan.terrain, probe.motion.tip_radius_m, depth_m)?;

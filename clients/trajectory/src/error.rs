@@ -1,0 +1,42 @@
+//! Errors of trajectories.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// Why a trajectory cannot be used.
+#[derive(Debug, Error)]
+pub enum TrajectoryError {
+    /// The file cannot be read.
+    #[error("{}: cannot be read", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A line that is not what it should be.
+    #[error("{}:{line}: {message}", path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// Line number, from 1 on.
+        line: u64,
+        /// What is wrong.
+        message: String,
+    },
+    /// No pose in it.
+    #[error("{}: no poses in it", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A workspace without room.
+    #[error("workspace from {min_m:?} to {max_m:?} m has no room: each min must be below its max, all finite")]
+    Workspace {
+        /// Lower corner.
+        min_m: [f64; 3],
+        /// Upper corner.
+        max_m: [f64; 3],
+    },
+}

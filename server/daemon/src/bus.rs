@@ -1,0 +1,231 @@
+//! Everything that touches Zenoh. The simulation thread never comes here: queues and triple buffers part the two.
+//!
+//! Callbacks run on Zenoh's receiving threads: they decode, store and return, and no panic leaves them. Streams are
+//! published, and questions answered, by threads of their own, so that a frozen client can hold up a reply but no tick.
+
+mod activate;
+mod counters;
+mod guard;
+mod intake;
+mod jobs;
+mod mesh;
+mod port_owner;
+mod pose_gate;
+mod poses;
+mod replies;
+mod rpc;
+mod session;
+mod skin;
+mod status;
+mod wrench;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::thread::{JoinHandle, Thread};
+use std::time::{Duration, Instant};
+
+use plica_jobs::Jobs;
+use plica_protocol::keys::Keys;
+use plica_scene::scene::PublishConfig;
+use plica_sim::Model;
+use zenoh::{Session, Wait};
+
+use crate::database_loader::Enrichment;
+use crate::realtime::{Grants, Ports};
+
+use counters::SharedCounters;
+use intake::PoseIntake;
+pub use session::{BusOptions, DEFAULT_ZENOH_CONFIG};
+
+/// `Session::close` can hang for ten seconds when a client is frozen.
+const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// Why the bus cannot be opened. Each message says what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum BusError {
+    /// The address is taken.
+    #[error(
+        "cannot listen on {endpoint}: the address is in use{owner}; stop that program, or choose another address with --listen"
+    )]
+    AddressInUse {
+        /// What was asked for.
+        endpoint: String,
+        /// Who has it, as far as can be seen.
+        owner: String,
+    },
+    /// The configuration file cannot be used.
+    #[error("{file}: {problem}; see configs/zenoh for working files")]
+    Config {
+        /// The file.
+        file: String,
+        /// What Zenoh said.
+        problem: String,
+    },
+    /// The session name cannot be part of a key.
+    #[error("--session: {0}")]
+    Session(#[from] plica_protocol::keys::NameError),
+    /// Anything else that Zenoh says.
+    #[error("the bus cannot be opened on {endpoint}: {problem}")]
+    Zenoh {
+        /// What was asked for.
+        endpoint: String,
+        /// What Zenoh said.
+        problem: String,
+    },
+    /// A thread cannot be started.
+    #[error("a thread cannot be started: {0}")]
+    Thread(#[from] std::io::Error),
+}
+
+/// What the bus needs to know of the scene.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// Name of the scene.
+    pub name: String,
+    /// Name of the object.
+    pub object: String,
+    /// Names of the tools, in the model's order.
+    pub tools: Vec<String>,
+    /// When each tool is stale \[s\].
+    pub stale_after_s: Vec<f64>,
+    /// Rates and format.
+    pub publish: PublishConfig,
+}
+
+/// What a bus is made of.
+pub struct Parts {
+    /// From [`Bus::open`].
+    pub session: Session,
+    /// Keys of the session.
+    pub keys: Keys,
+    /// What there is to publish.
+    pub scene: Scene,
+    /// The scene's model.
+    pub model: Arc<Model>,
+    /// What makes examples ready.
+    pub enrichment: Enrichment,
+    /// The simulation thread's other ends.
+    pub ports: Ports,
+    /// What the simulation thread was granted.
+    pub grants: Grants,
+    /// Jobs, or why there are none.
+    pub jobs: Jobs,
+}
+
+/// An open bus with all its publishers, subscribers and answering threads.
+pub struct Bus {
+    session: Session,
+    stop: Arc<AtomicBool>,
+    threads: Vec<JoinHandle<()>>,
+    wake: Vec<Thread>,
+    // Undeclared when dropped, before the session closes.
+    _declared: Declared,
+}
+
+/// What receives from Zenoh and ends with the bus.
+struct Declared {
+    _poses: zenoh::pubsub::Subscriber<()>,
+    _queryables: Vec<zenoh::query::Queryable<()>>,
+    _alive: zenoh::liveliness::LivelinessToken,
+}
+
+/// What the bus threads share.
+struct Shared {
+    session: Session,
+    keys: Keys,
+    scene: Scene,
+    model: Arc<Model>,
+    enrichment: Enrichment,
+    intake: Arc<PoseIntake>,
+    counters: Arc<SharedCounters>,
+    jobs: Jobs,
+    stop: Arc<AtomicBool>,
+    started: Instant,
+}
+
+impl Bus {
+    /// Opens the session. Separate from [`Bus::start`] so that a taken port is known before anything else is built.
+    pub fn open(options: &BusOptions) -> Result<Session, BusError> {
+        session::open(options)
+    }
+
+    /// Declares every key and starts the threads.
+    pub fn start(parts: Parts) -> Result<Self, BusError> {
+        let Parts { session, keys, scene, model, enrichment, ports, grants, jobs } = parts;
+        let Ports { poses, commands, frames, wrenches, readings, statistics } = ports;
+        let counters = Arc::new(SharedCounters::default());
+        let intake = Arc::new(PoseIntake::new(&scene, poses));
+        let stop = Arc::new(AtomicBool::new(false));
+        let shared = Arc::new(Shared {
+            session: session.clone(),
+            keys,
+            scene,
+            model,
+            enrichment,
+            intake,
+            counters,
+            jobs,
+            stop: Arc::clone(&stop),
+            started: Instant::now(),
+        });
+        let (replies, reply_thread) = replies::start(&shared)?;
+        let published = Arc::new(skin::Published::default());
+        let (skin_queries, skin_thread) = skin::start(&shared, frames, Arc::clone(&published), replies.clone())?;
+        let wrench_thread = wrench::start(&shared, wrenches)?;
+        let sources = status::Sources { readings, statistics, grants, published };
+        let (status_queries, status_thread) = status::start(&shared, sources, replies.clone())?;
+        let (job_requests, job_thread) = jobs::start(&shared, replies.clone())?;
+        let (rpc_queries, rpc_threads) = rpc::start(&shared, commands, replies.clone(), job_requests)?;
+        let mesh_queries = mesh::declare(&shared, replies)?;
+        let declared = Declared {
+            _poses: poses::declare(&shared)?,
+            _queryables: vec![skin_queries, status_queries, rpc_queries, mesh_queries],
+            _alive: alive(&shared)?,
+        };
+        let mut threads = vec![reply_thread, skin_thread, wrench_thread, status_thread, job_thread];
+        threads.extend(rpc_threads);
+        let wake = threads.iter().map(|t| t.thread().clone()).collect();
+        Ok(Self { session, stop, threads, wake, _declared: declared })
+    }
+
+    /// Stops the threads and closes the session, in two seconds at most.
+    pub fn close(self) {
+        let deadline = Instant::now() + CLOSE_TIMEOUT;
+        self.stop.store(true, Relaxed);
+        self.wake.iter().for_each(Thread::unpark);
+        let Self { session, threads, _declared, .. } = self;
+        let (done, closed) = std::sync::mpsc::channel();
+        let closing = std::thread::Builder::new().name("plica-close".into()).spawn(move || {
+            drop(_declared);
+            for thread in threads {
+                let _ = thread.join();
+            }
+            // An error here means that the links are gone already.
+            let _ = session.close().wait();
+            let _ = done.send(());
+        });
+        let left = deadline.saturating_duration_since(Instant::now());
+        if closing.is_ok() && closed.recv_timeout(left).is_err() {
+            tracing::warn!("the bus did not close within {} s (a frozen client?); leaving it", CLOSE_TIMEOUT.as_secs());
+        }
+    }
+}
+
+impl Shared {
+    fn stopping(&self) -> bool {
+        self.stop.load(Relaxed)
+    }
+
+    fn error(&self, problem: zenoh::Error) -> BusError {
+        BusError::Zenoh { endpoint: self.keys.root().to_owned(), problem: problem.to_string() }
+    }
+}
+
+fn alive(shared: &Shared) -> Result<zenoh::liveliness::LivelinessToken, BusError> {
+    shared.session.liveliness().declare_token(shared.keys.alive()).wait().map_err(|e| shared.error(e))
+}
+
+/// Starts a named thread.
+fn spawn(name: &str, body: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>, BusError> {
+    Ok(std::thread::Builder::new().name(name.into()).spawn(body)?)
+}

@@ -1,0 +1,344 @@
+//! The simulation thread's loop, without thread and clock.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64};
+
+use plica_sim::enrichment::LiveEnrichment;
+use plica_sim::{Model, PoseSample, State, TickInput, TickReport, ToolPose, Workspace};
+use triple_buffer::triple_buffer;
+
+use super::enrichment::Detail;
+use super::outbox::{Cadences, Outbox, Present, ToolOutlet};
+use super::snapshots::Snapshots;
+use super::{
+    Command, CommandPort, Frame, FramePort, Outcome, Ports, Reading, Refusal, Reply, Returned, Statistics, TurnProbe,
+    Waker, WrenchPort,
+};
+
+/// Poses per tool that may wait for a tick.
+const POSE_QUEUE: usize = 256;
+/// Poses per tool that wait while the simulation stands still by itself: the newest, as many as a tool's history holds.
+const POSES_KEPT_IN_PAUSE: usize = 16;
+/// Most poses of one [`Command::Step`].
+pub const MAX_STEP_POSES: usize = 1024;
+/// Wrenches per tool that may wait for their publisher.
+const WRENCH_QUEUE: usize = 256;
+/// Orders that may wait.
+const COMMAND_QUEUE: usize = 4;
+
+/// How a [`Loop`] runs.
+#[derive(Debug, Clone, Copy)]
+pub struct LoopOptions {
+    /// Skin frames per second of simulated time.
+    pub publish_hz: f64,
+    /// Wrenches per second of simulated time and tool.
+    pub wrench_hz: f64,
+    /// Ticks only when told to.
+    pub lock_step: bool,
+}
+
+/// What a turn did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Turn {
+    /// Nothing: the simulation stands still.
+    Still,
+    /// A tick.
+    Ticked(TickReport),
+}
+
+/// One object and its tools, its queues, and what it takes to turn the one into the other.
+///
+/// The clock that a tick is told is simulated time, so that a state, its pose histories and the clock always belong
+/// together: after a snapshot is restored, in lock-step, and in a run that was interrupted.
+pub struct Loop {
+    model: Arc<Model>,
+    state: State,
+    rest: State,
+    workspace: Workspace,
+    pose_queues: Vec<rtrb::Consumer<PoseSample>>,
+    poses: Vec<ToolPose>,
+    orders: rtrb::Consumer<Command>,
+    replies: rtrb::Producer<Reply>,
+    answered: Arc<Waker>,
+    simulation: Arc<Waker>,
+    snapshots: Snapshots,
+    detail: Detail,
+    outbox: Outbox,
+    statistics: Arc<Statistics>,
+    lock_step: bool,
+    paused: bool,
+    steps_left: u32,
+    step_poses: Vec<ToolPose>,
+    report: TickReport,
+}
+
+impl Loop {
+    /// A loop at rest, and the far ends of its queues. Everything that a turn needs is allocated here.
+    pub fn new(model: Arc<Model>, options: LoopOptions) -> (Self, Ports) {
+        let rest = State::new(&model);
+        let n_tools = model.n_tools();
+        let (pose_producers, pose_queues) = (0..n_tools).map(|_| rtrb::RingBuffer::new(POSE_QUEUE)).unzip();
+        let (orders_in, orders) = rtrb::RingBuffer::new(COMMAND_QUEUE);
+        let (replies, replies_out) = rtrb::RingBuffer::new(COMMAND_QUEUE);
+        let (answered, simulation) = (Arc::new(Waker::default()), Arc::new(Waker::default()));
+        let statistics = Arc::new(Statistics::default());
+        let (outbox, frames, wrenches, readings) = connect_outbox(&model, &rest, options, &simulation);
+        let commands = CommandPort {
+            orders: orders_in,
+            replies: replies_out,
+            answered: Arc::clone(&answered),
+            simulation: Arc::clone(&simulation),
+        };
+        let ports =
+            Ports { poses: pose_producers, commands, frames, wrenches, readings, statistics: Arc::clone(&statistics) };
+        let this = Self {
+            state: rest.clone(),
+            snapshots: Snapshots::new(&rest),
+            workspace: Workspace::new(&model),
+            poses: Vec::with_capacity(n_tools * POSE_QUEUE + MAX_STEP_POSES),
+            pose_queues,
+            orders,
+            replies,
+            answered,
+            simulation,
+            detail: Detail::default(),
+            outbox,
+            statistics,
+            lock_step: options.lock_step,
+            paused: options.lock_step,
+            steps_left: 0,
+            step_poses: Vec::new(),
+            report: TickReport::default(),
+            rest,
+            model,
+        };
+        (this, ports)
+    }
+
+    /// Obeys orders and, unless the simulation stands still, takes one tick.
+    pub fn turn(&mut self, probe: &mut impl TurnProbe) -> Turn {
+        self.obey_orders();
+        if self.stands_still() {
+            return self.stay();
+        }
+        self.take_poses();
+        self.tick(probe);
+        self.hand_out(probe);
+        self.count_step();
+        Turn::Ticked(self.report)
+    }
+
+    /// Enriches from now on, before it runs on a thread of its own; then [`Command::Activate`] does.
+    pub fn enrich(&mut self, live: Box<LiveEnrichment>) {
+        self.detail.activate(live, &self.model, &self.state);
+    }
+
+    /// The immutable part of the scene.
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+
+    /// The state after the last tick.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Counters and histograms.
+    pub fn statistics(&self) -> &Arc<Statistics> {
+        &self.statistics
+    }
+
+    /// Whether ticks of an order are left.
+    pub fn is_stepping(&self) -> bool {
+        self.steps_left > 0
+    }
+
+    /// Whether it ticks only when told to.
+    pub fn is_lock_step(&self) -> bool {
+        self.lock_step
+    }
+
+    /// Woken when an order or a question has come.
+    pub fn waker(&self) -> &Arc<Waker> {
+        &self.simulation
+    }
+
+    /// Runs ticks on a state that is thrown away, so that every page has been touched.
+    pub fn warm_up(&mut self, probe: &mut impl TurnProbe) {
+        let mut state = self.rest.clone();
+        for _ in 0..20 {
+            let input = TickInput { clock_s: state.sim_time_s(), poses: &[] };
+            plica_sim::tick(&self.model, input, &mut state, &mut self.workspace, probe);
+        }
+    }
+
+    fn stands_still(&self) -> bool {
+        self.paused && self.steps_left == 0
+    }
+
+    fn stay(&mut self) -> Turn {
+        if !self.lock_step {
+            self.trim_poses();
+        }
+        let present = Present { model: &self.model, state: &self.state, report: &self.report };
+        self.outbox.hand_out_still(present, &mut self.detail);
+        Turn::Still
+    }
+
+    fn trim_poses(&mut self) {
+        for queue in &mut self.pose_queues {
+            while queue.slots() > POSES_KEPT_IN_PAUSE && queue.pop().is_ok() {}
+        }
+    }
+
+    fn take_poses(&mut self) {
+        self.poses.clear();
+        for (tool, queue) in self.pose_queues.iter_mut().enumerate() {
+            // As many as there is room for: a sender that is faster than this loop cannot hold it up.
+            for _ in 0..queue.slots().min(POSE_QUEUE) {
+                let Ok(sample) = queue.pop() else { break };
+                self.poses.push(ToolPose { tool, sample });
+            }
+        }
+        self.poses.extend(self.step_poses.drain(..).take(MAX_STEP_POSES));
+    }
+
+    fn tick(&mut self, probe: &mut impl TurnProbe) {
+        let input = TickInput { clock_s: self.state.sim_time_s(), poses: &self.poses };
+        self.report = plica_sim::tick(&self.model, input, &mut self.state, &mut self.workspace, probe);
+        probe.leave();
+        self.detail.follow(&self.model, &self.state, probe);
+    }
+
+    fn hand_out(&mut self, probe: &mut impl TurnProbe) {
+        let present = Present { model: &self.model, state: &self.state, report: &self.report };
+        self.outbox.hand_out(present, &mut self.detail, &self.statistics, probe);
+    }
+
+    fn count_step(&mut self) {
+        if self.steps_left == 1 {
+            // Moved, not freed: the vector goes back with the reply.
+            let used = std::mem::take(&mut self.step_poses);
+            self.reply(Ok(None), Returned::Poses(used));
+        }
+        self.steps_left = self.steps_left.saturating_sub(1);
+    }
+
+    fn obey_orders(&mut self) {
+        while let Ok(order) = self.orders.pop() {
+            self.obey(order);
+        }
+    }
+
+    fn obey(&mut self, order: Command) {
+        match order {
+            Command::Pause => {
+                self.paused = true;
+                self.reply(Ok(None), Returned::Nothing);
+            }
+            Command::Resume if self.lock_step => self.reply(Err(Refusal::LockStep), Returned::Nothing),
+            Command::Resume => {
+                self.paused = false;
+                self.reply(Ok(None), Returned::Nothing);
+            }
+            Command::Step { poses, .. } if !self.paused => self.reply(Err(Refusal::NotPaused), Returned::Poses(poses)),
+            Command::Step { poses, .. } if self.steps_left > 0 => {
+                self.reply(Err(Refusal::Busy), Returned::Poses(poses))
+            }
+            Command::Step { ticks: 0, poses } => self.reply(Ok(None), Returned::Poses(poses)),
+            Command::Step { ticks, poses } => {
+                self.steps_left = ticks;
+                self.step_poses = poses;
+            }
+            Command::Snapshot => {
+                let id = self.snapshots.keep(&self.state);
+                self.reply(Ok(Some(id)), Returned::Nothing);
+            }
+            Command::Reset => {
+                self.restart();
+                self.reply(Ok(None), Returned::Nothing);
+            }
+            Command::Restore { id } => {
+                let found = self.snapshots.find(id).map(|kept| {
+                    self.state.copy_from(kept);
+                    self.detail.begin_anew(&self.model, &self.state);
+                });
+                self.reply(found.map(|()| None).ok_or(Refusal::UnknownSnapshot), Returned::Nothing);
+            }
+            Command::Activate(live) => {
+                let retired = self.detail.activate(live, &self.model, &self.state);
+                self.reply(Ok(None), Returned::Enrichment(retired));
+            }
+        }
+    }
+
+    fn restart(&mut self) {
+        self.state.copy_from(&self.rest);
+        self.detail.begin_anew(&self.model, &self.state);
+        self.outbox.forget();
+        self.report = TickReport::default();
+        for queue in &mut self.pose_queues {
+            while queue.pop().is_ok() {}
+        }
+    }
+
+    /// The status is true before the answer is heard.
+    fn reply(&mut self, result: Result<Option<u64>, Refusal>, returned: Returned) {
+        let present = Present { model: &self.model, state: &self.state, report: &self.report };
+        self.outbox.hand_out_reading(present, &self.detail, self.paused);
+        let outcome = result.map(|snapshot| Outcome {
+            tick: self.state.tick(),
+            sim_time_s: self.state.sim_time_s(),
+            paused: self.paused,
+            snapshot,
+            database_generation: self.detail.generation(),
+        });
+        // The asker keeps as many orders under way as there is room for answers.
+        let _ = self.replies.push(Reply { outcome, returned });
+        self.answered.wake();
+    }
+}
+
+fn connect_outbox(
+    model: &Model,
+    rest: &State,
+    options: LoopOptions,
+    simulation: &Arc<Waker>,
+) -> (Outbox, FramePort, Vec<WrenchPort>, triple_buffer::Output<Reading>) {
+    let frame = Frame { positions: vec![[0.0; 3]; model.n_skin()], ..Frame::default() };
+    let (frames, frames_out) = triple_buffer(&frame);
+    let (readings, readings_out) = triple_buffer(&Reading { tools: rest.tools().to_vec(), ..Reading::default() });
+    let (skin_waker, wrench_waker) = (Arc::new(Waker::default()), Arc::new(Waker::default()));
+    let (listening, questions) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
+    let tool = |_| {
+        let (queue, wrenches) = rtrb::RingBuffer::new(WRENCH_QUEUE);
+        let listening = Arc::new(AtomicBool::new(false));
+        let port = WrenchPort { wrenches, listening: Arc::clone(&listening), published: Arc::clone(&wrench_waker) };
+        (ToolOutlet { queue, listening }, port)
+    };
+    let (outlets, wrench_ports) = (0..model.n_tools()).map(tool).unzip();
+    let frame_port = FramePort {
+        frames: frames_out,
+        listening: Arc::clone(&listening),
+        questions: Arc::clone(&questions),
+        published: Arc::clone(&skin_waker),
+        simulation: Arc::clone(simulation),
+    };
+    let outbox = Outbox {
+        frames,
+        readings,
+        wrenches: outlets,
+        listening,
+        questions,
+        skin_waker,
+        wrench_waker,
+        cadences: Cadences::new(options.publish_hz, options.wrench_hz, model.timestep_s()),
+        answered: 0,
+        due: 0,
+        degraded: false,
+        was_sleeping: false,
+        max_penetration_m: 0.0,
+        fallbacks: 0,
+    };
+    (outbox, frame_port, wrench_ports, readings_out)
+}

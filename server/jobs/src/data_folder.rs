@@ -1,0 +1,143 @@
+//! The folder that a daemon keeps between its runs, and the lock that makes it one daemon's.
+
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Read, Seek, Write};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::clock::now_unix_s;
+use crate::files::to_json;
+
+/// Why a data folder is not used.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum DataFolderError {
+    /// Another daemon has it: this one must not start.
+    #[error(
+        "the data folder {folder} is in use by another plicad{owner}; stop that one, or choose another folder with --data"
+    )]
+    Locked {
+        /// The folder.
+        folder: String,
+        /// Process and session, as far as they are known.
+        owner: String,
+    },
+    /// It cannot be read or written: a daemon simulates without it, and takes no jobs.
+    #[error(
+        "the data folder {folder} cannot be used: {problem}; make it writable, or choose another folder with --data"
+    )]
+    Unusable {
+        /// The folder.
+        folder: String,
+        /// What the operating system said.
+        problem: String,
+    },
+}
+
+/// A locked data folder. The lock ends with the value, or with the process, however that ends.
+#[derive(Debug)]
+pub struct DataFolder {
+    path: PathBuf,
+    _lock: File,
+}
+
+/// What the lock file says, for people and for the message of a second daemon.
+#[derive(Debug, Serialize, Deserialize)]
+struct Owner {
+    pid: u32,
+    session: String,
+    started_unix_s: u64,
+}
+
+impl DataFolder {
+    /// Makes the folder if need be, and locks it.
+    pub fn open(path: &Path, session: &str) -> Result<Self, DataFolderError> {
+        let folder = path.display().to_string();
+        let unusable = |e: io::Error| DataFolderError::Unusable { folder: folder.clone(), problem: e.to_string() };
+        fs::create_dir_all(path.join("jobs")).map_err(unusable)?;
+        let path = path.canonicalize().map_err(unusable)?;
+        let mut lock = open_lock(&path.join("lock")).map_err(unusable)?;
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(DataFolderError::Locked { folder, owner: owner(&mut lock) }),
+            Err(TryLockError::Error(e)) => return Err(unusable(e)),
+        }
+        sign(&mut lock, session).map_err(unusable)?;
+        Ok(Self { path, _lock: lock })
+    }
+
+    /// The folder, absolute.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Where each job has a folder of its own.
+    pub fn jobs(&self) -> PathBuf {
+        self.path.join("jobs")
+    }
+}
+
+/// `$XDG_DATA_HOME/plica/<session>`, or `~/.local/share/plica/<session>`; the error is a sentence.
+pub fn default_path(session: &str) -> Result<PathBuf, String> {
+    let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
+    let shared = absolute("XDG_DATA_HOME").or_else(|| absolute("HOME").map(|home| home.join(".local/share")));
+    let shared = shared.ok_or("neither XDG_DATA_HOME nor HOME names a folder: choose a data folder with --data")?;
+    if session.chars().all(|c| c == '.') {
+        return Err(format!("no folder can be named after the session `{session}`: choose a data folder with --data"));
+    }
+    Ok(shared.join("plica").join(session))
+}
+
+fn open_lock(path: &Path) -> io::Result<File> {
+    OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)
+}
+
+fn sign(lock: &mut File, session: &str) -> io::Result<()> {
+    let owner = Owner { pid: std::process::id(), session: session.to_owned(), started_unix_s: now_unix_s() };
+    lock.set_len(0)?;
+    lock.rewind()?;
+    lock.write_all(&to_json(&owner))
+}
+
+fn owner(lock: &mut File) -> String {
+    let mut text = String::new();
+    let read = lock.read_to_string(&mut text).ok().and_then(|_| serde_json::from_str::<Owner>(&text).ok());
+    read.map_or_else(String::new, |o| format!(" (process {}, session `{}`)", o.pid, o.session))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+    use super::*;
+
+    #[test]
+    fn a_folder_has_one_daemon() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("deep/data");
+        let first = DataFolder::open(&path, "main").unwrap();
+        let error = DataFolder::open(&path, "other").unwrap_err().to_string();
+        let pid = format!("process {}, session `main`", std::process::id());
+        for part in [path.to_str().unwrap(), &pid, "stop that one", "--data"] {
+            assert!(error.contains(part), "{part} in {error}");
+        }
+        drop(first);
+        DataFolder::open(&path, "other").unwrap();
+    }
+
+    #[test]
+    fn a_folder_below_a_file_is_unusable() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("file"), "").unwrap();
+        let error = DataFolder::open(&folder.path().join("file/data"), "main").unwrap_err();
+        assert!(matches!(&error, DataFolderError::Unusable { .. }), "{error}");
+        assert!(error.to_string().contains("file/data cannot be used: "), "{error}");
+    }
+
+    #[test]
+    fn each_session_has_its_own_default() {
+        let (a, b) = (default_path("a").unwrap(), default_path("b").unwrap());
+        assert!(a.ends_with("plica/a") && b.ends_with("plica/b") && a.is_absolute());
+        default_path("..").unwrap_err();
+    }
+}

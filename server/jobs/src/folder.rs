@@ -1,0 +1,185 @@
+//! One job's folder: what was asked, where it stands, what came of it. All of it is text that a person can read.
+//!
+//! The daemon writes `job.json`, `scene.toml` and `state.json`; the job's process writes everything else.
+
+use std::fs;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use plica_protocol::jobs::{JobFile, JobState};
+use plica_training::{Job, Progress, Stage};
+use serde::{Deserialize, Serialize};
+
+use crate::files::{read_json, to_json, write_atomically};
+
+/// How much of the end of a log is looked at.
+const TAIL_BYTES: u64 = 4096;
+/// Longest last line that is repeated to clients, in characters.
+const LINE_CHARS: usize = 400;
+
+/// `state.json`: where the job stands.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Standing {
+    /// One of the states of the protocol.
+    pub state: JobState,
+    /// Why, in words.
+    pub reason: Option<String>,
+    /// When the process was last started, in seconds since 1970.
+    pub started_unix_s: Option<u64>,
+    /// When the job ended, in seconds since 1970.
+    pub finished_unix_s: Option<u64>,
+    /// The process, while it runs.
+    pub pid: Option<u32>,
+}
+
+impl Standing {
+    /// A job that waits.
+    pub fn queued() -> Self {
+        Self { state: JobState::Queued, reason: None, started_unix_s: None, finished_unix_s: None, pid: None }
+    }
+}
+
+/// A job's folder.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct JobFolder(PathBuf);
+
+impl JobFolder {
+    /// The folder at a path, which need not exist yet.
+    pub fn new(path: PathBuf) -> Self {
+        Self(path)
+    }
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// Where the scene is.
+    pub fn scene(&self) -> PathBuf {
+        self.0.join("scene.toml")
+    }
+
+    /// Where the process writes its log.
+    pub fn log(&self) -> PathBuf {
+        self.0.join("log.txt")
+    }
+
+    /// Where a result is, once the job is done.
+    pub fn result(&self, file: JobFile) -> PathBuf {
+        self.0.join(match file {
+            JobFile::Database => "database.safetensors",
+            JobFile::Report => "report.json",
+        })
+    }
+
+    /// Reads `job.json`; the error is a sentence.
+    pub fn job(&self) -> Result<Job, String> {
+        read_json(&self.0.join("job.json"))
+    }
+
+    /// Writes `job.json`.
+    pub fn write_job(&self, job: &Job) -> io::Result<()> {
+        write_atomically(&self.0.join("job.json"), &to_json(job))
+    }
+
+    /// Reads `state.json`; the error is a sentence.
+    pub fn standing(&self) -> Result<Standing, String> {
+        read_json(&self.0.join("state.json"))
+    }
+
+    /// Writes `state.json`.
+    pub fn write_standing(&self, standing: &Standing) -> io::Result<()> {
+        write_atomically(&self.0.join("state.json"), &to_json(standing))
+    }
+
+    /// What `progress.json` says; `None` before there is one. A process that begins anew says that nothing is finished
+    /// until it has read what is there: then the examples on disk are counted.
+    pub fn progress(&self) -> Option<Progress> {
+        let progress: Progress = read_json(&self.0.join("progress.json")).ok()?;
+        if progress.stage != Stage::Interactions {
+            return Some(progress);
+        }
+        let (done, rejected) = (self.count(".safetensors"), self.count(".rejected.json"));
+        Some(Progress { done, rejected, ..progress })
+    }
+
+    fn count(&self, ending: &str) -> u32 {
+        let is_one = |name: &str| name.ends_with(ending) && !name.starts_with('.');
+        let entries = fs::read_dir(self.0.join("examples")).into_iter().flatten().flatten();
+        entries.filter(|entry| entry.file_name().to_str().is_some_and(is_one)).count() as u32
+    }
+
+    /// Whether a process works in it, one started by hand or one that is still ending: it holds a lock.
+    pub fn is_busy(&self) -> bool {
+        let lock = fs::File::open(self.0.join(".lock"));
+        lock.is_ok_and(|lock| matches!(lock.try_lock(), Err(fs::TryLockError::WouldBlock)))
+    }
+
+    /// The last line of the log that says something.
+    pub fn last_words(&self) -> Option<String> {
+        let mut file = fs::File::open(self.log()).ok()?;
+        let length = file.seek(SeekFrom::End(0)).ok()?;
+        file.seek(SeekFrom::Start(length.saturating_sub(TAIL_BYTES))).ok()?;
+        let mut tail = Vec::new();
+        file.take(TAIL_BYTES).read_to_end(&mut tail).ok()?;
+        last_line(&String::from_utf8_lossy(&tail))
+    }
+}
+
+fn last_line(text: &str) -> Option<String> {
+    let line = text.lines().rev().map(str::trim).find(|line| !line.is_empty())?;
+    let line = line.strip_prefix("plicad: ").unwrap_or(line);
+    Some(line.chars().filter(|c| !c.is_control()).take(LINE_CHARS).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+    use super::*;
+
+    #[test]
+    fn the_last_line_is_the_last_that_says_something() {
+        assert_eq!(last_line("one\nplicad: two \n\n  \n").as_deref(), Some("two"));
+        assert_eq!(last_line("\u{1b}[31mred\n").as_deref(), Some("[31mred"));
+        assert_eq!(last_line("\n \n"), None);
+        assert_eq!(last_line(&"x".repeat(9999)).unwrap().len(), LINE_CHARS);
+    }
+
+    #[test]
+    fn files_have_the_keys_of_the_page() {
+        let folder = tempfile::tempdir().unwrap();
+        let job = JobFolder::new(folder.path().to_owned());
+        job.write_standing(&Standing::queued()).unwrap();
+        let text = fs::read_to_string(folder.path().join("state.json")).unwrap();
+        let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let keys: Vec<_> = json.as_object().unwrap().keys().map(String::as_str).collect();
+        assert_eq!(keys, ["finished_unix_s", "pid", "reason", "started_unix_s", "state"]);
+        assert_eq!(job.standing().unwrap(), Standing::queued());
+        let progress = r#"{"stage": "examples", "done": 3, "rejected": 1, "total": 8, "seconds_left": null}"#;
+        fs::write(folder.path().join("progress.json"), progress).unwrap();
+        let progress = job.progress().unwrap();
+        assert_eq!((progress.done, progress.rejected, progress.total), (3, 1, 8));
+        let beginning = r#"{"stage": "interactions", "done": 0, "rejected": 0, "total": 8, "seconds_left": null}"#;
+        fs::write(folder.path().join("progress.json"), beginning).unwrap();
+        fs::create_dir(folder.path().join("examples")).unwrap();
+        for name in ["00000.safetensors", "00003.safetensors", "00001.rejected.json", ".00002.safetensors.tmp"] {
+            fs::write(folder.path().join("examples").join(name), "").unwrap();
+        }
+        let progress = job.progress().unwrap();
+        assert_eq!((progress.done, progress.rejected, progress.total), (2, 1, 8), "what is on disk");
+        assert!(job.job().unwrap_err().contains("job.json cannot be read"));
+        assert_eq!(job.last_words(), None);
+    }
+
+    #[test]
+    fn a_folder_is_busy_while_a_process_holds_its_lock() {
+        let folder = tempfile::tempdir().unwrap();
+        let job = JobFolder::new(folder.path().to_owned());
+        assert!(!job.is_busy());
+        let held = plica_training::Folder::open(folder.path()).unwrap();
+        assert!(job.is_busy());
+        drop(held);
+        assert!(!job.is_busy());
+    }
+}

@@ -1,0 +1,203 @@
+//! Jobs: long-running work in processes of their own, queued, supervised and kept on disk.
+//!
+//! [`Jobs`] answers questions and takes requests from any thread; one thread of [`Supervision`] runs the processes. The
+//! simulation thread knows nothing of either.
+
+pub mod by_hand;
+mod clock;
+mod data_folder;
+mod error;
+mod fetch;
+mod files;
+mod folder;
+mod priority;
+mod process;
+mod reason;
+mod recover;
+mod scene;
+mod store;
+mod submit;
+mod supervisor;
+mod view;
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+
+use plica_protocol::chunk::ChunkHeader;
+use plica_protocol::jobs::{
+    Job, JobFetchRequest, JobFile, JobListReply, JobState, JobStatus, JobSubmitReply, JobSubmitRequest, MAX_IN_STATUS,
+};
+use plica_protocol::rpc::ErrorReply;
+
+pub use data_folder::{DataFolder, DataFolderError, default_path};
+pub use error::JobError;
+pub use folder::{JobFolder, Standing};
+pub use priority::{Priority, lower};
+pub use process::Launch;
+pub use scene::ServedScene;
+
+use clock::now_unix_s;
+use fetch::Sums;
+use store::Store;
+use supervisor::Supervisor;
+
+/// All jobs of a daemon, or why it has none. Cheap to clone.
+#[derive(Debug, Clone)]
+pub struct Jobs(Result<Arc<Shared>, String>);
+
+#[derive(Debug)]
+struct Shared {
+    store: Arc<Store>,
+    sums: Sums,
+    served: ServedScene,
+    supervisor: std::thread::Thread,
+    /// One submission at a time: they share a folder until they are complete.
+    submitting: Mutex<()>,
+}
+
+/// The thread that runs jobs. Dropped, it stops the running one, which goes on when the next daemon starts.
+#[derive(Debug)]
+pub struct Supervision {
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+    _folder: DataFolder,
+}
+
+impl Jobs {
+    /// A daemon without jobs; `reason` is told to whoever asks for one.
+    pub fn unavailable(reason: impl Into<String>) -> Self {
+        Self(Err(reason.into()))
+    }
+
+    /// Reads what the folder holds and starts to work on it.
+    pub fn start(folder: DataFolder, served: ServedScene, launch: Launch) -> std::io::Result<(Self, Supervision)> {
+        let store = Arc::new(recover::recover(&folder.jobs())?);
+        let stop = Arc::new(AtomicBool::new(false));
+        let supervisor = Supervisor::new(Arc::clone(&store), launch, Arc::clone(&stop));
+        let thread = std::thread::Builder::new().name("plica-supervise".into()).spawn(move || supervisor.run())?;
+        let (sums, supervisor) = (Sums::default(), thread.thread().clone());
+        let shared = Shared { store, sums, served, supervisor, submitting: Mutex::new(()) };
+        let supervision = Supervision { stop, thread: Some(thread), _folder: folder };
+        Ok((Self(Ok(Arc::new(shared))), supervision))
+    }
+
+    /// Why there are no jobs.
+    pub fn why_unavailable(&self) -> Option<&str> {
+        self.0.as_ref().err().map(String::as_str)
+    }
+
+    /// Queues a job.
+    pub fn submit(&self, request: &JobSubmitRequest) -> Result<JobSubmitReply, ErrorReply> {
+        request.check()?;
+        let shared = self.shared()?;
+        let _alone = shared.submitting.lock().unwrap_or_else(PoisonError::into_inner);
+        let reply = submit::submit(&shared.store, request, &shared.served)?;
+        shared.supervisor.unpark();
+        Ok(reply)
+    }
+
+    /// The newest jobs.
+    pub fn list(&self) -> Result<JobListReply, JobError> {
+        Ok(self.shared()?.store.list())
+    }
+
+    /// One job.
+    pub fn get(&self, id: &str) -> Result<Job, JobError> {
+        let shared = self.shared()?;
+        shared.job(shared.store.find(id)?)
+    }
+
+    /// Ends a job: at once in name, a moment later in fact.
+    pub fn cancel(&self, id: &str) -> Result<Job, JobError> {
+        self.decide(id, |standing| {
+            if standing.state.is_over() {
+                return Err(JobError::Over { id: id.to_owned(), state: standing.state });
+            }
+            let (started_unix_s, finished_unix_s) = (standing.started_unix_s, Some(now_unix_s()));
+            *standing = Standing { state: JobState::Cancelled, started_unix_s, finished_unix_s, ..Standing::queued() };
+            Ok(())
+        })
+    }
+
+    /// Queues a job again that ended without a result.
+    pub fn resume(&self, id: &str) -> Result<Job, JobError> {
+        self.decide(id, |standing| match standing.state {
+            JobState::Failed | JobState::Cancelled | JobState::Paused => {
+                *standing = Standing { started_unix_s: standing.started_unix_s, ..Standing::queued() };
+                Ok(())
+            }
+            state => Err(JobError::NotResumable { id: id.to_owned(), state }),
+        })
+    }
+
+    /// A piece of a result.
+    pub fn piece(&self, request: &JobFetchRequest, offset: u64) -> Result<(ChunkHeader, Vec<u8>), ErrorReply> {
+        let path = self.result(&request.id, request.file)?;
+        self.shared()?.sums.piece(&path, offset)
+    }
+
+    /// Where a result of a job that is done lies.
+    pub fn result(&self, id: &str, file: JobFile) -> Result<PathBuf, JobError> {
+        let store = &self.shared()?.store;
+        let entry = store.entry(store.find(id)?).ok_or_else(|| JobError::Unknown(id.to_owned()))?;
+        let state = entry.standing.state;
+        if state != JobState::Done {
+            return Err(JobError::NotDone { id: id.to_owned(), state, file });
+        }
+        Ok(entry.folder.result(file))
+    }
+
+    /// Jobs that have changed since a version (0: ever), and the version now.
+    pub fn changed_since(&self, version: u64) -> (u64, Vec<Job>) {
+        self.0.as_ref().map_or_else(|_| (version, Vec::new()), |shared| shared.store.changed_since(version))
+    }
+
+    /// The newest jobs, for the status.
+    pub fn status(&self) -> Vec<JobStatus> {
+        let newest = |shared: &Arc<Shared>| shared.store.newest(MAX_IN_STATUS).iter().map(JobStatus::from).collect();
+        self.0.as_ref().map_or_else(|_| Vec::new(), newest)
+    }
+
+    /// Changes where a job stands and keeps it, if it can be kept.
+    fn decide(&self, id: &str, change: impl FnOnce(&mut Standing) -> Result<(), JobError>) -> Result<Job, JobError> {
+        let shared = self.shared()?;
+        let number = shared.store.find(id)?;
+        shared.store.change(number, change).unwrap_or_else(|| Err(JobError::Unknown(id.to_owned())))?;
+        if let Err(e) = shared.store.save(number) {
+            tracing::warn!("the state of job {id} cannot be written and is kept in memory: {e}");
+        }
+        shared.supervisor.unpark();
+        shared.job(number)
+    }
+
+    fn shared(&self) -> Result<&Arc<Shared>, JobError> {
+        self.0.as_ref().map_err(|reason| JobError::Unavailable(reason.clone()))
+    }
+}
+
+impl Shared {
+    fn job(&self, number: u32) -> Result<Job, JobError> {
+        let entry = self.store.entry(number);
+        entry.map(|entry| entry.job()).ok_or_else(|| JobError::Unknown(number.to_string()))
+    }
+}
+
+impl Supervision {
+    /// Asks the running job to stop, and waits for nothing.
+    pub fn begin_stop(&self) {
+        self.stop.store(true, Relaxed);
+        if let Some(thread) = &self.thread {
+            thread.thread().unpark();
+        }
+    }
+}
+
+impl Drop for Supervision {
+    fn drop(&mut self) {
+        self.begin_stop();
+        // A panic in the thread has been reported by itself.
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
+}

@@ -1,0 +1,182 @@
+//! The scene of a job: text, and the files that it names (meshes, recorded motions), checked before the job is taken.
+
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+
+use plica_protocol::jobs::JobSubmitRequest;
+use plica_scene::Config;
+use plica_scene::scene::named_files;
+
+use crate::error::JobError;
+use crate::files::write_and_sync;
+
+/// Largest file that a job takes along.
+const MAX_FILE_BYTES: u64 = 64 << 20;
+
+/// What a job's folder holds already.
+const OWN_NAMES: [&str; 8] = [
+    "job.json",
+    "scene.toml",
+    "state.json",
+    "progress.json",
+    "log.txt",
+    "examples",
+    "database.safetensors",
+    "report.json",
+];
+
+/// The scene that the daemon serves, as it was read.
+#[derive(Debug, Clone)]
+pub struct ServedScene {
+    /// Its name.
+    pub name: String,
+    /// The folder that the files it names are taken from; none for the built-in scene.
+    pub folder: Option<PathBuf>,
+    /// Its text.
+    pub text: String,
+}
+
+/// A checked scene and what belongs to it.
+#[derive(Debug)]
+pub(crate) struct JobScene {
+    pub(crate) name: String,
+    text: String,
+    /// Path below the scene's folder, and content.
+    files: Vec<(PathBuf, Vec<u8>)>,
+}
+
+impl JobScene {
+    /// The scene of a request, or the served one.
+    pub(crate) fn new(request: &JobSubmitRequest, served: &ServedScene) -> Result<Self, JobError> {
+        let folder = served.folder.as_deref();
+        let (name, text) = match &request.scene {
+            Some(text) => (request.scene_name.as_deref().unwrap_or("scene"), text),
+            None => (served.name.as_str(), &served.text),
+        };
+        let files = take_files(text, folder, request.scene.is_none())?;
+        check(name, text, folder)?;
+        Ok(Self { name: name.to_owned(), text: text.clone(), files })
+    }
+
+    /// Writes `scene.toml` and what it names into a job's folder.
+    pub(crate) fn write(&self, folder: &Path) -> std::io::Result<()> {
+        write_and_sync(&folder.join("scene.toml"), self.text.as_bytes())?;
+        for (path, bytes) in &self.files {
+            let path = folder.join(path);
+            fs::create_dir_all(path.parent().unwrap_or(folder))?;
+            write_and_sync(&path, bytes)?;
+        }
+        Ok(())
+    }
+}
+
+/// What the scene file's own errors say, without the daemon's folders.
+fn check(name: &str, text: &str, folder: Option<&Path>) -> Result<(), JobError> {
+    let file = PathBuf::from(format!("{name}.toml"));
+    match Config::parse(&folder.unwrap_or(Path::new("")).join(&file), text) {
+        Ok(_) => Ok(()),
+        Err(mut error) => {
+            error.file = file;
+            Err(JobError::Scene(error.to_string()))
+        }
+    }
+}
+
+/// Reads the files that a scene names, before anything else does: they are small, ordinary, and where they may be.
+///
+/// The daemon's own scene may name others by absolute paths; they stay where they are.
+fn take_files(text: &str, folder: Option<&Path>, own: bool) -> Result<Vec<(PathBuf, Vec<u8>)>, JobError> {
+    // Text that is no scene is refused a moment later, with the line.
+    let named = named_files(Path::new("scene.toml"), text).into_iter().map(|file| file.typed);
+    let wanted = named.filter(|name| !(own && Path::new(name).is_absolute()));
+    wanted.map(|name| read_file(&name, folder).map(|bytes| (PathBuf::from(name), bytes))).collect()
+}
+
+fn read_file(name: &str, folder: Option<&Path>) -> Result<Vec<u8>, JobError> {
+    let refuse = |why: &str| Err(JobError::Scene(format!("file = \"{name}\": {why}")));
+    if !is_plain(name) {
+        return refuse("the files of a job's scene lie beside the served scene or below it");
+    }
+    let Some(folder) = folder else { return refuse("the built-in scene is served, and there are no files beside it") };
+    let path = folder.join(name);
+    match fs::metadata(&path) {
+        Ok(file) if !file.is_file() => refuse("it is no ordinary file"),
+        Ok(file) if file.len() > MAX_FILE_BYTES => refuse("it is larger than 64 MiB"),
+        Ok(_) => fs::read(&path).or_else(|e| refuse(&format!("it cannot be read: {e}"))),
+        Err(e) => refuse(&format!("it cannot be read beside the served scene: {e}")),
+    }
+}
+
+/// Whether a path leads down only, and to none of a job's own files.
+fn is_plain(name: &str) -> bool {
+    let mut parts = Path::new(name).components();
+    let down = !name.is_empty() && parts.clone().all(|part| matches!(part, Component::Normal(_)));
+    down && parts.next().is_some_and(|first| !OWN_NAMES.iter().any(|own| first.as_os_str() == *own))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+    use super::*;
+    use plica_protocol::jobs::JobKind;
+    use plica_scene::BUILT_IN_SCENE;
+
+    const TETRAHEDRON: &str = "v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nv 0 0 0.01\nf 1 2 3\nf 1 2 4\n";
+
+    fn with_mesh(file: &str) -> String {
+        let mesh = format!("shape = {{ mesh = {{ file = \"{file}\", metres_per_unit = 1.0 }} }}");
+        let line = BUILT_IN_SCENE.lines().find(|line| line.starts_with("shape = { capsule")).unwrap();
+        BUILT_IN_SCENE.replace(line, &mesh)
+    }
+
+    fn served(folder: &Path) -> ServedScene {
+        fs::create_dir_all(folder.join("tools")).unwrap();
+        fs::write(folder.join("tools/rod.obj"), TETRAHEDRON).unwrap();
+        ServedScene { name: "wedge".to_owned(), folder: Some(folder.to_owned()), text: with_mesh("tools/rod.obj") }
+    }
+
+    fn submitted(text: String) -> JobSubmitRequest {
+        let name = Some("mine".to_owned());
+        JobSubmitRequest { scene: Some(text), scene_name: name, ..JobSubmitRequest::new("a", JobKind::Training) }
+    }
+
+    #[test]
+    fn files_come_along() {
+        let (folder, job) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let served = served(folder.path());
+        let scene = JobScene::new(&JobSubmitRequest::new("a", JobKind::Training), &served).unwrap();
+        scene.write(job.path()).unwrap();
+        assert_eq!(fs::read_to_string(job.path().join("tools/rod.obj")).unwrap(), TETRAHEDRON);
+        assert_eq!(fs::read_to_string(job.path().join("scene.toml")).unwrap(), served.text);
+        Config::from_file(&job.path().join("scene.toml")).unwrap();
+        assert_eq!(JobScene::new(&submitted(with_mesh("tools/rod.obj")), &served).unwrap().name, "mine");
+    }
+
+    #[test]
+    fn files_from_elsewhere_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let served = served(folder.path());
+        fs::write(folder.path().join("examples"), "").unwrap();
+        let secret = folder.path().join("tools/rod.obj");
+        for bad in ["../rod.obj", "/dev/zero", secret.to_str().unwrap(), "tools", "no.obj", "examples", "job.json"] {
+            let error = JobScene::new(&submitted(with_mesh(bad)), &served).unwrap_err().to_string();
+            assert!(error.starts_with(&format!("file = \"{bad}\": ")), "{error}");
+        }
+        let built_in = ServedScene { folder: None, ..served };
+        let error = JobScene::new(&submitted(with_mesh("tools/rod.obj")), &built_in).unwrap_err().to_string();
+        assert!(error.contains("the built-in scene is served"), "{error}");
+    }
+
+    #[test]
+    fn a_bad_scene_is_refused_with_line_and_key() {
+        let folder = tempfile::tempdir().unwrap();
+        let served = served(folder.path());
+        let refused = |text: &str| JobScene::new(&submitted(text.to_owned()), &served).unwrap_err().to_string();
+        let stiff = BUILT_IN_SCENE.replacen("young_modulus_pa = 3e4", "young_modulus_pa = -1.0", 1);
+        let error = refused(&stiff);
+        assert!(error.starts_with("mine.toml:") && error.contains("young_modulus_pa: -1 is outside"), "{error}");
+        assert!(refused("[objects").contains("not valid TOML"));
+        assert!(refused("").contains("mine.toml"));
+    }
+}

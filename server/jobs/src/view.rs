@@ -1,0 +1,46 @@
+//! Jobs as clients see them.
+
+use plica_protocol::jobs::{Job, JobKind, Progress};
+use plica_training::Stage;
+
+use crate::folder::Standing;
+
+/// What a job makes.
+pub(crate) fn training_kind(kind: JobKind) -> plica_training::JobKind {
+    match kind {
+        JobKind::Training => plica_training::JobKind::Training,
+        JobKind::Evaluation => plica_training::JobKind::Evaluation,
+    }
+}
+
+/// A job: what was asked, where it stands, what its process has said.
+pub(crate) fn job(order: &plica_training::Job, standing: &Standing, progress: Option<plica_training::Progress>) -> Job {
+    Job {
+        id: order.id.clone(),
+        client_id: order.client_id.clone(),
+        kind: match order.kind {
+            plica_training::JobKind::Training => JobKind::Training,
+            plica_training::JobKind::Evaluation => JobKind::Evaluation,
+        },
+        scene_name: order.scene_name.clone(),
+        examples: order.examples,
+        seed: order.seed,
+        threads: order.threads.unwrap_or(1),
+        submitted_unix_s: order.submitted_unix_s,
+        state: standing.state,
+        reason: standing.reason.clone(),
+        started_unix_s: standing.started_unix_s,
+        finished_unix_s: standing.finished_unix_s,
+        progress: progress.map(job_progress).unwrap_or_default(),
+    }
+}
+
+fn job_progress(progress: plica_training::Progress) -> Progress {
+    let plica_training::Progress { stage, done, rejected, total, seconds_left } = progress;
+    let stage = match stage {
+        Stage::Interactions => "interactions",
+        Stage::Examples => "examples",
+        Stage::Database => "database",
+    };
+    Progress { stage: Some(stage.to_owned()), done, rejected, total, seconds_left }
+}

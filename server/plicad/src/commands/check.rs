@@ -1,0 +1,108 @@
+//! `plicad check`.
+
+use plica_daemon::limits::{check_frame, frame_bytes};
+use plica_scene::Config;
+use plica_scene::model;
+use serde::Serialize;
+
+use crate::cli::CheckArgs;
+use crate::commands::bench::{bench, table_bytes, work};
+use crate::roofline::Roofline;
+
+/// Ticks that are timed for the estimate.
+const TRIAL_TICKS: u64 = 500;
+/// Solver iterations and passes assumed where there is no motion to try.
+const TYPICAL: (f64, f64) = (4.0, 2.0);
+/// How far a tick usually stays from its limit.
+const TYPICAL_RATIO: f64 = 3.0;
+
+/// What a scene costs.
+#[derive(Debug, Serialize)]
+struct Report {
+    scene: String,
+    object: String,
+    tools: Vec<String>,
+    n_nodes: usize,
+    n_free_nodes: usize,
+    n_hexes: usize,
+    n_skin: usize,
+    n_triangles: usize,
+    embedding_fallbacks: usize,
+    block_tridiagonal: bool,
+    table_bytes: usize,
+    frame_bytes: u64,
+    skin_bytes_per_s: f64,
+    wrench_bytes_per_s: f64,
+    estimated_tick_us: f64,
+    estimate: &'static str,
+    budget_us: f64,
+}
+
+/// Prints what a scene will cost; fails where it cannot be served.
+pub fn run(args: &CheckArgs, json: bool) -> anyhow::Result<()> {
+    let config = super::scene(&args.scene)?;
+    let report = check(&config)?;
+    print(&report);
+    if json {
+        println!("{}", serde_json::to_string(&report)?);
+    }
+    Ok(())
+}
+
+fn check(config: &Config) -> anyhow::Result<Report> {
+    let model = model::build(config)?;
+    check_frame(config, model.n_skin())?;
+    let cost = model.cost();
+    let publish = config.object().publish();
+    let frame_bytes = frame_bytes(config, model.n_skin());
+    let (estimated_tick_us, estimate) = match config.bench() {
+        Some(motion) => (bench(config, motion, TRIAL_TICKS)?.tick_us.p50, "median of a trial of the [bench] motion"),
+        None => {
+            let (bytes, flops) = work(&model, TYPICAL.0, TYPICAL.1);
+            let limit_s = Roofline::measure(table_bytes(&model)).limit_s(bytes, flops);
+            (1e6 * TYPICAL_RATIO * limit_s, "from bytes and operations; a [bench] table gives a better one")
+        }
+    };
+    Ok(Report {
+        scene: config.name().to_owned(),
+        object: config.object().name().to_owned(),
+        tools: config.tools().iter().map(|t| t.name.clone()).collect(),
+        n_nodes: model.n_nodes(),
+        n_free_nodes: cost.n_free,
+        n_hexes: model.description().mesh.n_hexes(),
+        n_skin: model.n_skin(),
+        n_triangles: model.description().skin.n_triangles(),
+        embedding_fallbacks: model.description().embedding.fallbacks().len(),
+        block_tridiagonal: cost.block_tridiagonal,
+        table_bytes: table_bytes(&model),
+        frame_bytes,
+        skin_bytes_per_s: frame_bytes as f64 * publish.publish_hz,
+        wrench_bytes_per_s: plica_protocol::wrench::BYTES as f64 * publish.wrench_hz * config.tools().len() as f64,
+        estimated_tick_us,
+        estimate,
+        budget_us: 1e6 * config.runtime().timestep_s(),
+    })
+}
+
+fn print(r: &Report) {
+    let tools = if r.tools.is_empty() { "none".into() } else { r.tools.join(", ") };
+    let solver = if r.block_tridiagonal { "block tridiagonal" } else { "block Jacobi" };
+    println!("scene      {} with object `{}`, tools: {tools}", r.scene, r.object);
+    println!(
+        "coarse     {} hexahedra, {} nodes, {} of them free; preconditioner: {solver}",
+        r.n_hexes, r.n_nodes, r.n_free_nodes
+    );
+    println!(
+        "skin       {} vertices, {} triangles, {} vertices embedded trilinearly",
+        r.n_skin, r.n_triangles, r.embedding_fallbacks
+    );
+    println!("tables     {:.0} KiB read per tick or more often", r.table_bytes as f64 / 1024.0);
+    println!("frame      {} bytes, {:.1} MB/s to each listener", r.frame_bytes, 1e-6 * r.skin_bytes_per_s);
+    println!("wrenches   {:.2} MB/s to each listener", 1e-6 * r.wrench_bytes_per_s);
+    println!("tick       about {:.0} of {:.0} us ({})", r.estimated_tick_us, r.budget_us, r.estimate);
+    if r.estimated_tick_us > 0.8 * r.budget_us {
+        println!(
+            "           too slow for this machine: use fewer divisions, fewer substeps, or a longer runtime.timestep_s"
+        );
+    }
+}

@@ -1,0 +1,66 @@
+//! `plicad evaluate`.
+
+mod databases;
+mod table;
+
+use std::path::Path;
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use plica_training::evaluation::{Evaluation, Judge, Method, evaluate, methods, slide};
+
+use crate::cli::EvaluateArgs;
+pub(super) use databases::read;
+use plica_scene::setup::setup;
+
+/// Judges methods and prints the result.
+pub fn run(args: &EvaluateArgs, json: bool) -> anyhow::Result<()> {
+    let config = super::scene(args.scene.as_deref().unwrap_or(Path::new("wedge")))?;
+    let setup = setup(&config)?;
+    let methods = chosen(methods(setup.stamp_axes), &args.methods)?;
+    let (training, held_out) = read(&config, &setup, &args.databases)?;
+    let judge = Judge::new(&setup, &training, &held_out)?;
+    let n_examples = args.examples.map_or(usize::MAX, |n| n as usize);
+    let bar = bar();
+    let told = |done: usize, all: usize, what: &str| tell(&bar, done, all, what);
+    let mut found = evaluate(&judge, &methods, n_examples, &told)?;
+    if args.slide {
+        found.slide = Some(slide(&setup, &judge, &methods, n_examples, (&told, &|| false))?);
+    }
+    bar.finish_and_clear();
+    table::print(config.name(), &found);
+    if json {
+        println!("{}", summary(config.name(), &found)?);
+    }
+    Ok(())
+}
+
+/// Those that are named, in the order of the list.
+fn chosen(all: Vec<Method>, names: &[String]) -> anyhow::Result<Vec<Method>> {
+    if let Some(unknown) = names.iter().find(|name| all.iter().all(|m| m.name != **name)) {
+        let known: Vec<&str> = all.iter().map(|m| m.name.as_str()).collect();
+        anyhow::bail!("--methods: there is no method `{unknown}`; there are {}", known.join(", "));
+    }
+    Ok(all.into_iter().filter(|m| names.is_empty() || names.contains(&m.name)).collect())
+}
+
+/// A bar on the terminal.
+pub(super) fn bar() -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {msg}").expect("the template is fixed");
+    let bar = ProgressBar::new(1).with_style(style).with_message("builds the model");
+    bar.enable_steady_tick(Duration::from_millis(500));
+    bar
+}
+
+/// Shows what comes next.
+pub(super) fn tell(bar: &ProgressBar, done: usize, all: usize, what: &str) {
+    bar.set_length(all as u64);
+    bar.set_position(done as u64);
+    bar.set_message(what.to_owned());
+}
+
+fn summary(scene: &str, found: &Evaluation) -> Result<String, serde_json::Error> {
+    let mut value = serde_json::to_value(found)?;
+    value["scene"] = scene.into();
+    serde_json::to_string(&value)
+}

@@ -1,0 +1,52 @@
+//! The databases of a scene, where `plicad train` leaves them or where somebody says.
+
+use std::path::{Path, PathBuf};
+
+use plica_scene::Config;
+use plica_training::{Database, JobKind, Setup};
+
+use crate::cli::DatabaseArgs;
+
+/// Examples to learn from, and those to judge by.
+///
+/// # Errors
+/// A file is missing, damaged, or belongs to another scene.
+pub(in crate::commands) fn read(
+    config: &Config,
+    setup: &Setup,
+    args: &DatabaseArgs,
+) -> anyhow::Result<(Database, Database)> {
+    let read = |given: &Option<PathBuf>, kind| {
+        let path = given.clone().unwrap_or_else(|| default_path(config, kind));
+        if !path.exists() {
+            anyhow::bail!(
+                "{}: there is no such file; `{}` makes it",
+                path.display(),
+                command(config, kind, &path, given)
+            );
+        }
+        let database = Database::read(&path, Some(&setup.scene_hash))?;
+        anyhow::ensure!(
+            database.about.kind == kind,
+            "{}: is a database of kind {}, one of kind {} is needed here",
+            path.display(),
+            database.about.kind.name(),
+            kind.name()
+        );
+        Ok(database)
+    };
+    Ok((read(&args.training, JobKind::Training)?, read(&args.held_out, JobKind::Evaluation)?))
+}
+
+fn default_path(config: &Config, kind: JobKind) -> PathBuf {
+    Path::new("out/train").join(format!("{}-{}", config.name(), kind.name())).join("database.safetensors")
+}
+
+/// What makes the file that is missing.
+fn command(config: &Config, kind: JobKind, path: &Path, given: &Option<PathBuf>) -> String {
+    let file = config.file();
+    let scene = if file.exists() { file.display().to_string() } else { config.name().to_owned() };
+    let kind = if kind == JobKind::Training { "" } else { " --kind evaluation" };
+    let out = given.as_ref().map_or(String::new(), |_| format!(" --out {}", path.display()));
+    format!("plicad train {scene}{kind}{out}")
+}

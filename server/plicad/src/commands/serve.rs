@@ -1,0 +1,78 @@
+//! `plicad serve`.
+
+use std::path::Path;
+use std::time::Duration;
+
+use anyhow::Context;
+use plica_daemon::server::Server;
+use plica_jobs::{DataFolder, DataFolderError, Jobs, Launch, ServedScene, Supervision, default_path};
+use plica_scene::Config;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+
+use crate::cli::ServeArgs;
+
+const LOOK_AROUND: Duration = Duration::from_millis(100);
+
+/// Serves a scene until SIGINT or SIGTERM.
+pub fn run(args: &ServeArgs, json: bool) -> anyhow::Result<()> {
+    // Registered first, so that a signal during the start is not lost.
+    let mut signals = Signals::new([SIGINT, SIGTERM]).context("cannot listen for signals")?;
+    let mut config = args.scene.as_deref().map_or_else(Config::built_in, Config::from_file)?;
+    if let Some(file) = &args.database {
+        config.set_database(file.clone());
+    }
+    let options = args.bus.options();
+    let server = Server::start_with_jobs(&config, &options, args.lock_step, || open_jobs(args, &config))?;
+    for warning in &server.grants().warnings {
+        tracing::warn!("{warning}");
+    }
+    let pace = if args.lock_step { "in lock-step" } else { "in real time" };
+    tracing::info!("serving {} {pace} on {} as session `{}`", config.name(), options.place(), options.session);
+    let outcome = wait(&server, &mut signals);
+    server.stop();
+    tracing::info!("stopped");
+    outcome?;
+    if json {
+        println!("{}", serde_json::json!({ "scene": config.name(), "stopped": true }));
+    }
+    Ok(())
+}
+
+/// Jobs in the data folder. With a folder that cannot be used the daemon goes on without jobs, and says so here and in
+/// its status; one that another daemon has is an error.
+fn open_jobs(args: &ServeArgs, config: &Config) -> Result<(Jobs, Option<Supervision>), DataFolderError> {
+    let session = &args.bus.session;
+    let path = match args.data.clone().map_or_else(|| default_path(session), Ok) {
+        Ok(path) => path,
+        Err(problem) => return Ok(without_jobs(problem)),
+    };
+    let folder = match DataFolder::open(&path, session) {
+        Ok(folder) => folder,
+        Err(error @ DataFolderError::Locked { .. }) => return Err(error),
+        Err(error) => return Ok(without_jobs(error.to_string())),
+    };
+    let scene_folder = args.scene.as_ref().and_then(|file| file.parent()).map(Path::to_owned);
+    let served = ServedScene { name: config.name().to_owned(), folder: scene_folder, text: config.text().to_owned() };
+    let launch = Launch::own(args.job_priority.into(), config.runtime().cpu());
+    let started = launch.and_then(|launch| Jobs::start(folder, served, launch));
+    Ok(started.map_or_else(|e| without_jobs(e.to_string()), |(jobs, supervision)| (jobs, Some(supervision))))
+}
+
+fn without_jobs(problem: String) -> (Jobs, Option<Supervision>) {
+    tracing::warn!("no jobs: {problem}");
+    (Jobs::unavailable(problem), None)
+}
+
+fn wait(server: &Server, signals: &mut Signals) -> anyhow::Result<()> {
+    loop {
+        if signals.pending().next().is_some() {
+            return Ok(());
+        }
+        anyhow::ensure!(
+            server.is_alive(),
+            "the simulation thread has ended by itself; see the message above, and report it"
+        );
+        std::thread::sleep(LOOK_AROUND);
+    }
+}

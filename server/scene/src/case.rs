@@ -1,0 +1,29 @@
+//! Case files of `plicad solve`: [`RawCase`] as typed, [`Case`] checked, [`Problem`] ready to be solved.
+
+mod checked;
+mod follow;
+mod held;
+mod material;
+mod mesh;
+mod output;
+mod probe;
+mod problem;
+mod raw;
+mod reading;
+mod select;
+mod solution;
+mod support;
+
+pub use checked::{Case, SolveOptions};
+pub use follow::{Failure, News, follow};
+pub use mesh::MeshSource;
+pub use output::write_result;
+pub use probe::Probe;
+pub use problem::{Load, Problem};
+pub use raw::RawCase;
+pub use reading::Reading;
+pub use solution::{LoadStep, Solution};
+pub use support::Support;
+
+#[cfg(test)]
+mod tests;

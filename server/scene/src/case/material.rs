@@ -1,0 +1,79 @@
+//! Materials and regions of a case.
+
+use plica_accurate::{Lame, Material, MaterialModel};
+use plica_geometry::select::Selector;
+
+use super::raw::{RawMaterial, RawModel, RawRegion};
+use super::select;
+use crate::checks::Check;
+use crate::error::ConfigError;
+
+/// Range of stiffnesses \[Pa\].
+const STIFFNESS: [f64; 2] = [1e-3, 1e13];
+
+/// Hexahedra of another material.
+#[derive(Debug, Clone)]
+pub(super) struct Region {
+    pub(super) selector: Selector,
+    pub(super) material: Material,
+}
+
+pub(super) fn check(c: &Check<'_>, raw: &RawMaterial) -> Result<Material, ConfigError> {
+    constants(c, "material", raw)
+}
+
+/// Regions; what they leave out is the base material's.
+pub(super) fn check_regions(
+    c: &Check<'_>,
+    raw: &[RawRegion],
+    base: &RawMaterial,
+    material: Material,
+) -> Result<Vec<Region>, ConfigError> {
+    let region = |(i, r): (usize, &RawRegion)| {
+        let key = format!("regions.{i}");
+        let own = RawMaterial {
+            model: r.model.unwrap_or(base.model),
+            young_modulus_pa: r.young_modulus_pa,
+            poisson_ratio: r.poisson_ratio,
+            mu_pa: r.mu_pa,
+            lambda_pa: r.lambda_pa,
+        };
+        let keeps_constants = [r.young_modulus_pa, r.poisson_ratio, r.mu_pa, r.lambda_pa] == [None; 4];
+        let material = match keeps_constants {
+            true => Material { model: model(own.model), ..material },
+            false => constants(c, &key, &own)?,
+        };
+        Ok(Region { selector: select::check(c, &format!("{key}.select"), &r.select)?, material })
+    };
+    raw.iter().enumerate().map(region).collect()
+}
+
+fn constants(c: &Check<'_>, key: &str, raw: &RawMaterial) -> Result<Material, ConfigError> {
+    let model = model(raw.model);
+    let stiffness = |name: &str, value: f64| c.number(&format!("{key}.{name}"), value, STIFFNESS[0], STIFFNESS[1]);
+    match (raw.young_modulus_pa, raw.poisson_ratio, raw.mu_pa, raw.lambda_pa) {
+        (Some(young), Some(poisson), None, None) => Ok(Material {
+            model,
+            young_modulus_pa: stiffness("young_modulus_pa", young)?,
+            poisson_ratio: c.number(&format!("{key}.poisson_ratio"), poisson, -0.99, 0.499_999)?,
+        }),
+        (None, None, Some(mu), Some(lambda)) => {
+            let mu_pa = stiffness("mu_pa", mu)?;
+            // Poisson's ratio from -0.5 on; up to 0.499999 as above.
+            let lambda_pa = c.number(&format!("{key}.lambda_pa"), lambda, -0.5 * mu_pa, 5e5 * mu_pa)?;
+            Ok(Material::from_lame(model, Lame { lambda_pa, mu_pa }))
+        }
+        _ => {
+            let advice = "give young_modulus_pa and poisson_ratio, or mu_pa and lambda_pa";
+            Err(c.error(key, "an isotropic material has two constants that belong together", advice))
+        }
+    }
+}
+
+fn model(raw: RawModel) -> MaterialModel {
+    match raw {
+        RawModel::Linear => MaterialModel::Linear,
+        RawModel::CompressibleNeoHookean => MaterialModel::CompressibleNeoHookean,
+        RawModel::StableNeoHookean => MaterialModel::StableNeoHookean,
+    }
+}

@@ -1,0 +1,148 @@
+//! Probes: what a case tells of its result.
+
+use nalgebra::Point3;
+use plica_geometry::import::NamedMesh;
+use plica_geometry::isoparametric::shape_functions;
+use plica_geometry::select::Selector;
+use plica_geometry::{HexIdx, Location, NodeIdx, locate};
+
+use super::raw::{RawProbe, RawQuantity, RawSupport};
+use super::select;
+use crate::checks::Check;
+use crate::document::Document;
+use crate::error::ConfigError;
+
+/// A point may lie outside the mesh by this share of its diagonal: rounding of coordinates.
+const OUTSIDE_TOLERANCE: f64 = 1e-6;
+
+/// A probe as checked, before the mesh is known.
+#[derive(Debug, Clone)]
+pub(super) struct ProbeSpec {
+    name: String,
+    target: Target,
+}
+
+#[derive(Debug, Clone)]
+enum Target {
+    DisplacementAt(Point3<f64>),
+    DisplacementNearest(Point3<f64>),
+    DisplacementOver(Selector),
+    Force(usize),
+    Volume,
+    StressAt(Point3<f64>),
+}
+
+/// A probe that knows its nodes or its hexahedron.
+#[derive(Debug, Clone)]
+pub struct Probe {
+    /// Name in the output.
+    pub name: String,
+    pub(super) sensor: Sensor,
+}
+
+#[derive(Debug, Clone)]
+pub(super) enum Sensor {
+    /// Weighted sum of displacements.
+    Displacement(Vec<(NodeIdx, f64)>),
+    /// Force of a support by number.
+    Force(usize),
+    Volume,
+    /// Cauchy stress at reference coordinates of a hexahedron.
+    Stress(HexIdx, [f64; 3]),
+}
+
+pub(super) fn check(c: &Check<'_>, raw: &[RawProbe], supports: &[RawSupport]) -> Result<Vec<ProbeSpec>, ConfigError> {
+    let probe = |(i, p): (usize, &RawProbe)| {
+        let target = check_target(c, &format!("probes.{i}"), p, supports)?;
+        Ok(ProbeSpec { name: p.name.clone(), target })
+    };
+    raw.iter().enumerate().map(probe).collect()
+}
+
+fn check_target(c: &Check<'_>, key: &str, p: &RawProbe, supports: &[RawSupport]) -> Result<Target, ConfigError> {
+    let (quantity, allowed): (&str, &[&str]) = match p.quantity {
+        RawQuantity::Displacement => ("displacement", &["at_m", "nearest_to_m", "select"]),
+        RawQuantity::Force => ("force", &["support"]),
+        RawQuantity::Stress => ("stress", &["at_m"]),
+        RawQuantity::Volume => ("volume", &[]),
+    };
+    let given = [
+        ("at_m", p.at_m.is_some()),
+        ("nearest_to_m", p.nearest_to_m.is_some()),
+        ("select", p.select.is_some()),
+        ("support", p.support.is_some()),
+    ];
+    let given: Vec<&str> = given.iter().filter(|(_, is_given)| *is_given).map(|(name, _)| *name).collect();
+    if let Some(name) = given.iter().find(|name| !allowed.contains(name)) {
+        return Err(c.error(&format!("{key}.{name}"), format!("has no meaning with {quantity}"), "remove the key"));
+    }
+    if given.len() != allowed.len().min(1) {
+        let advice = format!("give exactly one of {}", allowed.join(", "));
+        return Err(c.error(key, format!("{quantity} is asked for at {} places", given.len()), advice));
+    }
+    let point = |name: &str, x: [f64; 3]| c.point(&format!("{key}.{name}"), x);
+    match (p.quantity, p.at_m, p.nearest_to_m, &p.select, &p.support) {
+        (RawQuantity::Displacement, Some(x), ..) => point("at_m", x).map(Target::DisplacementAt),
+        (RawQuantity::Displacement, _, Some(x), ..) => point("nearest_to_m", x).map(Target::DisplacementNearest),
+        (RawQuantity::Displacement, .., Some(s), _) => {
+            select::check(c, &format!("{key}.select"), s).map(Target::DisplacementOver)
+        }
+        (RawQuantity::Stress, Some(x), ..) => point("at_m", x).map(Target::StressAt),
+        (.., Some(name)) => check_support(c, key, name, supports).map(Target::Force),
+        _ => Ok(Target::Volume),
+    }
+}
+
+fn check_support(c: &Check<'_>, key: &str, name: &str, supports: &[RawSupport]) -> Result<usize, ConfigError> {
+    supports.iter().position(|s| s.name == name).ok_or_else(|| {
+        let known: Vec<&str> = supports.iter().map(|s| s.name.as_str()).collect();
+        let problem = format!("there is no support `{name}`");
+        c.error(&format!("{key}.support"), problem, format!("name one of: {}", known.join(", ")))
+    })
+}
+
+impl ProbeSpec {
+    /// Finds the nodes or the hexahedron of a probe; `key` is its path in the file.
+    pub(super) fn resolve(&self, document: &Document, key: &str, mesh: &NamedMesh) -> Result<Probe, ConfigError> {
+        let sensor = match &self.target {
+            Target::DisplacementAt(x) => Sensor::Displacement(weights(mesh, &find(document, key, mesh, x)?)),
+            Target::DisplacementNearest(x) => Sensor::Displacement(vec![(nearest_node(mesh, x), 1.0)]),
+            Target::DisplacementOver(selector) => {
+                let nodes = selector.nodes(&mesh.mesh, &mesh.groups);
+                let nodes = nodes.map_err(|e| select::explain(document, &format!("{key}.select"), &mesh.mesh, &e))?;
+                let share = 1.0 / nodes.len() as f64;
+                Sensor::Displacement(nodes.into_iter().map(|node| (node, share)).collect())
+            }
+            Target::Force(support) => Sensor::Force(*support),
+            Target::Volume => Sensor::Volume,
+            Target::StressAt(x) => {
+                let found = find(document, key, mesh, x)?;
+                Sensor::Stress(found.hex, found.xi)
+            }
+        };
+        Ok(Probe { name: self.name.clone(), sensor })
+    }
+}
+
+/// The place of a point in the mesh, its reference coordinates within the hexahedron.
+fn find(document: &Document, key: &str, mesh: &NamedMesh, x: &Point3<f64>) -> Result<Location, ConfigError> {
+    let [lower, upper] = mesh.mesh.bounds();
+    let reach = OUTSIDE_TOLERANCE * (upper - lower).norm();
+    match locate(&mesh.mesh, x, reach) {
+        Some(found) => Ok(Location { xi: found.xi.map(|c| c.clamp(-1.0, 1.0)), ..found }),
+        None => {
+            let problem = format!("lies outside the body at rest, which spans {}", select::extent(&mesh.mesh));
+            Err(document.error(&format!("{key}.at_m"), problem, "give a point inside, or nearest_to_m for a node"))
+        }
+    }
+}
+
+fn weights(mesh: &NamedMesh, found: &Location) -> Vec<(NodeIdx, f64)> {
+    mesh.mesh.hexes()[found.hex.index()].into_iter().zip(shape_functions(found.xi)).collect()
+}
+
+fn nearest_node(mesh: &NamedMesh, x: &Point3<f64>) -> NodeIdx {
+    let distances = mesh.mesh.nodes().iter().map(|node| (node - x).norm()).enumerate();
+    let nearest = distances.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(node, _)| node);
+    NodeIdx::from_index(nearest)
+}

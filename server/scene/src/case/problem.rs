@@ -1,0 +1,174 @@
+//! A case whose selections are found: what is solved.
+
+use nalgebra::Vector3;
+use plica_accurate::{Constraints, Energy, Material, MaterialModel, NodalForces, Pressure, Solid, Traction, reactions};
+use plica_geometry::import::NamedMesh;
+use plica_geometry::{HexMesh, NodeIdx};
+
+use super::checked::{Case, LoadKind, LoadSpec};
+use super::probe::Probe;
+use super::support::{self, Support};
+use super::{held, select};
+use crate::document::Document;
+use crate::error::ConfigError;
+
+/// A mesh with materials, supports, loads and probes.
+#[derive(Debug)]
+pub struct Problem {
+    mesh: NamedMesh,
+    solid: Solid,
+    is_linear: bool,
+    /// Region of each hexahedron: 0 for the base material, else one more than its place in the file.
+    region_of_hex: Vec<usize>,
+    supports: Vec<Support>,
+    loads: Vec<Load>,
+    probes: Vec<Probe>,
+}
+
+/// A load at full strength.
+#[derive(Debug, Clone)]
+pub enum Load {
+    /// Force per rest area \[Pa\] on faces.
+    Traction(Vec<[NodeIdx; 4]>, Vector3<f64>),
+    /// Pressure \[Pa\] on deformed faces.
+    Pressure(Vec<[NodeIdx; 4]>, f64),
+    /// Forces \[N\] at nodes.
+    Forces(Vec<(NodeIdx, Vector3<f64>)>),
+}
+
+impl Problem {
+    /// Makes or reads the mesh and finds what the case selects.
+    ///
+    /// # Errors
+    /// [`ConfigError`]: a mesh that cannot be had, a selection that selects nothing, supports that contradict each other or
+    /// leave a body free to move.
+    pub fn new(case: &Case) -> Result<Self, ConfigError> {
+        let document = &case.document;
+        let mesh = case.mesh.load(document)?;
+        let (solid, region_of_hex) = make_solid(case, &mesh)?;
+        let supports = support::find(document, &case.supports, &mesh)?;
+        held::check(document, &mesh.mesh, &supports)?;
+        let loads = case.loads.iter().enumerate();
+        let loads = loads.map(|(i, load)| find_load(document, &format!("loads.{i}"), load, &mesh));
+        let loads = loads.collect::<Result<_, _>>()?;
+        let probes = case.probes.iter().enumerate();
+        let probes = probes.map(|(i, probe)| probe.resolve(document, &format!("probes.{i}"), &mesh));
+        let probes = probes.collect::<Result<_, _>>()?;
+        let is_linear = case.materials().all(|material| material.model == MaterialModel::Linear);
+        Ok(Self { mesh, solid, is_linear, region_of_hex, supports, loads, probes })
+    }
+
+    /// The mesh at rest.
+    pub fn mesh(&self) -> &HexMesh {
+        &self.mesh.mesh
+    }
+
+    /// Its elasticity.
+    pub fn solid(&self) -> &Solid {
+        &self.solid
+    }
+
+    /// Whether all materials are linear: then `det F` says nothing about the result.
+    pub fn is_linear(&self) -> bool {
+        self.is_linear
+    }
+
+    /// Region of each hexahedron: 0 for the base material, else one more than the region's place in the file.
+    pub fn region_of_hex(&self) -> &[usize] {
+        &self.region_of_hex
+    }
+
+    /// Supports in the order of the file.
+    pub fn supports(&self) -> &[Support] {
+        &self.supports
+    }
+
+    /// Loads in the order of the file.
+    pub fn loads(&self) -> &[Load] {
+        &self.loads
+    }
+
+    /// Probes in the order of the file.
+    pub fn probes(&self) -> &[Probe] {
+        &self.probes
+    }
+
+    /// Given positions when a share of the displacements is applied.
+    pub(super) fn constraints_at(&self, share: f64) -> Constraints {
+        let mut constraints = Constraints::none(self.mesh().n_nodes());
+        for support in &self.supports {
+            for (node, axes) in &support.nodes {
+                let x = self.mesh().nodes()[node.index()];
+                for k in (0..3).filter(|&k| axes[k]) {
+                    constraints.give(node.index(), k, x[k] + share * support.displacement_m[k]);
+                }
+            }
+        }
+        constraints
+    }
+
+    /// Loads when a share of them is applied.
+    pub(super) fn loads_at(&self, share: f64) -> Vec<Box<dyn Energy>> {
+        self.loads.iter().map(|load| load.at(self.mesh(), share)).collect()
+    }
+
+    /// Force of a support on the body at node positions `x` \[N\].
+    pub(super) fn support_force(&self, support: usize, x: &[Vector3<f64>]) -> Vector3<f64> {
+        let loads = self.loads_at(1.0);
+        let forces = reactions(&energies(&self.solid, &loads), x);
+        let held = self.supports[support].nodes.iter();
+        held.map(|(node, axes)| Vector3::from_fn(|k, _| if axes[k] { forces[node.index()][k] } else { 0.0 })).sum()
+    }
+}
+
+/// Elasticity and loads as the solver takes them.
+pub(super) fn energies<'a>(solid: &'a Solid, loads: &'a [Box<dyn Energy>]) -> Vec<&'a dyn Energy> {
+    std::iter::once(solid as &dyn Energy).chain(loads.iter().map(Box::as_ref)).collect()
+}
+
+fn make_solid(case: &Case, mesh: &NamedMesh) -> Result<(Solid, Vec<usize>), ConfigError> {
+    let mut materials: Vec<Material> = vec![case.material; mesh.mesh.n_hexes()];
+    let mut region_of_hex = vec![0; mesh.mesh.n_hexes()];
+    for (i, region) in case.regions.iter().enumerate() {
+        let hexes = region.selector.hexes(&mesh.mesh, &mesh.groups);
+        let key = format!("regions.{i}.select");
+        for hex in hexes.map_err(|e| select::explain(&case.document, &key, &mesh.mesh, &e))? {
+            materials[hex.index()] = region.material;
+            region_of_hex[hex.index()] = i + 1;
+        }
+    }
+    let solid = Solid::new(&mesh.mesh, &materials);
+    let refused =
+        |e: plica_accurate::SolidError| case.document.error("material", e.to_string(), "change the constants");
+    Ok((solid.map_err(refused)?, region_of_hex))
+}
+
+fn find_load(document: &Document, key: &str, spec: &LoadSpec, mesh: &NamedMesh) -> Result<Load, ConfigError> {
+    let explain = |e| select::explain(document, &format!("{key}.select"), &mesh.mesh, &e);
+    let faces = spec.selector.faces(&mesh.mesh, &mesh.groups);
+    Ok(match (spec.kind, faces) {
+        (LoadKind::Traction(traction), faces) => Load::Traction(faces.map_err(explain)?, traction.into()),
+        (LoadKind::Pressure(pressure), faces) => Load::Pressure(faces.map_err(explain)?, pressure),
+        (LoadKind::Force(force), Ok(faces)) => {
+            let area: f64 = faces.iter().map(|quad| mesh.mesh.quad_area(quad)).sum();
+            Load::Traction(faces, Vector3::from(force) / area)
+        }
+        (LoadKind::Force(force), Err(_)) => {
+            let nodes = spec.selector.nodes(&mesh.mesh, &mesh.groups).map_err(explain)?;
+            let share = Vector3::from(force) / nodes.len() as f64;
+            Load::Forces(nodes.into_iter().map(|node| (node, share)).collect())
+        }
+    })
+}
+
+impl Load {
+    fn at(&self, mesh: &HexMesh, share: f64) -> Box<dyn Energy> {
+        match self {
+            Self::Traction(quads, traction_pa) => Box::new(Traction::new(mesh, quads, traction_pa * share)),
+            Self::Pressure(quads, pressure_pa) => Box::new(Pressure::new(quads.clone(), pressure_pa * share)),
+            Self::Forces(forces) => {
+                Box::new(NodalForces::new(forces.iter().map(|(node, force)| (*node, force * share)).collect()))
+            }
+        }
+    }
+}

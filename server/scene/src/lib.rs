@@ -1,0 +1,20 @@
+//! What files say: scenes, cases of the accurate solver and recorded motions, checked; and from them the descriptions that
+//! the simulation, the accurate solver and training are built from.
+//!
+//! A file is parsed once into a raw type (as typed) and once into a checked type (SI units, every number within its range).
+//! The numerical crates check their own inputs again, since they are libraries.
+
+mod checks;
+mod document;
+mod error;
+
+pub mod case;
+pub mod hash;
+pub mod model;
+pub mod motion;
+pub mod scene;
+pub mod setup;
+
+pub use document::Document;
+pub use error::ConfigError;
+pub use scene::{BUILT_IN_SCENE, Config};

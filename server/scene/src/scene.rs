@@ -1,0 +1,194 @@
+//! Scene files: [`RawConfig`] is what was typed, [`Config`] is what is meant. Parsed and checked once; nothing checks again.
+
+mod accurate;
+mod bench;
+mod enrichment;
+mod files;
+mod material;
+mod object;
+pub(crate) mod raw;
+mod runtime;
+mod tool;
+mod training;
+
+use std::path::{Path, PathBuf};
+
+use plica_sim::{ContactOptions, Plane, SleepOptions, ToolDescription};
+
+pub use accurate::AccurateConfig;
+pub use bench::{BenchConfig, Keyframe};
+pub use enrichment::EnrichmentConfig;
+pub use files::{SceneFile, named_files};
+pub use material::Region;
+pub use object::{Face, FixedConfig, MeshConfig, ObjectConfig, PositionFormat, PublishConfig, SkinConfig};
+pub use raw::RawConfig;
+pub use runtime::RuntimeConfig;
+pub use training::{OutsideConfig, RecordedConfig, TrainingConfig};
+
+use crate::checks::Check;
+use crate::document::Document;
+use crate::error::ConfigError;
+
+/// The wedge that runs when no scene is named.
+pub const BUILT_IN_SCENE: &str = include_str!("../../../configs/scenes/wedge.toml");
+
+/// A checked scene. SI units; every number is within the range that `plicad schema` names.
+#[derive(Debug, Clone)]
+pub struct Config {
+    name: String,
+    file: PathBuf,
+    object: ObjectConfig,
+    tools: Vec<ToolDescription>,
+    contact: ContactOptions,
+    runtime: RuntimeConfig,
+    bench: Option<BenchConfig>,
+    training: TrainingConfig,
+    enrichment: EnrichmentConfig,
+    files: Vec<SceneFile>,
+    text: String,
+}
+
+/// JSON Schema of scene files.
+pub fn schema() -> schemars::Schema {
+    schemars::schema_for!(RawConfig)
+}
+
+impl Config {
+    /// The built-in scene.
+    pub fn built_in() -> Result<Self, ConfigError> {
+        Self::parse(Path::new("wedge.toml"), BUILT_IN_SCENE)
+    }
+
+    /// Reads and checks a scene file.
+    pub fn from_file(file: &Path) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(file).map_err(|e| ConfigError {
+            file: file.to_owned(),
+            line: None,
+            key: String::new(),
+            problem: format!("cannot be read: {e}"),
+            advice: "check the path; `plicad serve` without a scene runs the built-in wedge".into(),
+        })?;
+        Self::parse(file, &text)
+    }
+
+    /// Checks the text of a scene file. `file` names it in messages and resolves relative paths.
+    pub fn parse(file: &Path, text: &str) -> Result<Self, ConfigError> {
+        let document = Document::parse(file, text)?;
+        let raw: RawConfig = document.read()?;
+        let check = Check::new(&document);
+        let object = object::check(&check, &raw.objects)?;
+        let tools = tool::check(&check, &raw.tools)?;
+        let bench = raw.bench.as_ref().map(|b| bench::check(&check, b, &tools)).transpose()?;
+        let training = check_training(&check, &raw, &tools)?;
+        Ok(Self {
+            name: file.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned()),
+            file: file.to_owned(),
+            object,
+            contact: runtime::check_contact(&check, &raw.contact)?,
+            runtime: runtime::check(&check, &raw.runtime)?,
+            enrichment: check_enrichment(&check, &raw, &training)?,
+            training,
+            files: files::list(file, &raw),
+            text: text.to_owned(),
+            tools,
+            bench,
+        })
+    }
+
+    /// Name of the scene: the file's name without its ending.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// File that the scene was read from.
+    pub fn file(&self) -> &Path {
+        &self.file
+    }
+
+    /// The object.
+    pub fn object(&self) -> &ObjectConfig {
+        &self.object
+    }
+
+    /// Replaces the element of the real-time model, to compare both in one scene.
+    pub fn set_element(&mut self, element: plica_sim::ElementKind) {
+        self.object.set_element(element);
+    }
+
+    /// Tools in alphabetical order of their names.
+    pub fn tools(&self) -> &[ToolDescription] {
+        &self.tools
+    }
+
+    /// Index of a tool by name.
+    pub fn tool_index(&self, name: &str) -> Option<usize> {
+        self.tools.iter().position(|t| t.name == name)
+    }
+
+    /// Contact detection and law.
+    pub fn contact(&self) -> &ContactOptions {
+        &self.contact
+    }
+
+    /// Time step, gravity, real-time thread.
+    pub fn runtime(&self) -> &RuntimeConfig {
+        &self.runtime
+    }
+
+    /// What `plicad bench` does with the tools.
+    pub fn bench(&self) -> Option<&BenchConfig> {
+        self.bench.as_ref()
+    }
+
+    /// What `plicad train` does.
+    pub fn training(&self) -> &TrainingConfig {
+        &self.training
+    }
+
+    /// How examples become detail on the skin.
+    pub fn enrichment(&self) -> &EnrichmentConfig {
+        &self.enrichment
+    }
+
+    /// Names the examples to start with, in place of those that the scene names.
+    pub fn set_database(&mut self, file: PathBuf) {
+        self.enrichment.database = Some(file);
+    }
+
+    /// Files that belong to the scene, and go with it into a job's folder.
+    pub fn files(&self) -> &[SceneFile] {
+        &self.files
+    }
+
+    /// The scene file's text.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Immovable half-spaces.
+    pub fn planes(&self) -> &[Plane] {
+        self.object.planes()
+    }
+
+    /// When the object sleeps.
+    pub fn sleep(&self) -> &SleepOptions {
+        self.runtime.sleep()
+    }
+}
+
+fn check_training(c: &Check<'_>, raw: &RawConfig, tools: &[ToolDescription]) -> Result<TrainingConfig, ConfigError> {
+    let (name, object) = raw.objects.first_key_value().expect("the object was checked before");
+    training::check(c, &format!("objects.{name}.training"), &object.training, tools)
+}
+
+fn check_enrichment(
+    c: &Check<'_>,
+    raw: &RawConfig,
+    training: &TrainingConfig,
+) -> Result<EnrichmentConfig, ConfigError> {
+    let (name, object) = raw.objects.first_key_value().expect("the object was checked before");
+    enrichment::check(c, &format!("objects.{name}.enrichment"), &object.enrichment, training.stamp_axes)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,96 @@
+//! Files that a scene names: tools from meshes, recorded motions.
+
+use std::path::{Path, PathBuf};
+
+use super::raw::{RawConfig, RawShape};
+use crate::document::Document;
+
+/// A file that a scene names.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneFile {
+    /// Key that names it.
+    pub key: String,
+    /// Path as typed, relative to the scene file.
+    pub typed: String,
+    /// Where it is.
+    pub path: PathBuf,
+    /// Of a mesh: metres per unit.
+    pub metres_per_unit: Option<f64>,
+}
+
+/// Files that the text of a scene names, before anything reads them; none if the text is no scene. `file` resolves
+/// relative paths.
+pub fn named_files(file: &Path, text: &str) -> Vec<SceneFile> {
+    let document = Document::parse(file, text);
+    let listed = document.and_then(|document| Ok(list(document.file(), &document.read()?)));
+    listed.unwrap_or_default()
+}
+
+/// The one answer to which files belong to a scene: each key of type [`RawFile`](super::raw::RawFile).
+pub(super) fn list(scene: &Path, raw: &RawConfig) -> Vec<SceneFile> {
+    let folder = scene.parent().map(PathBuf::from).unwrap_or_default();
+    let file = |key: String, typed: &str, metres_per_unit: Option<f64>| SceneFile {
+        key,
+        typed: typed.to_owned(),
+        path: folder.join(typed),
+        metres_per_unit,
+    };
+    let meshes = raw.tools.iter().filter_map(|(name, tool)| match &tool.shape {
+        RawShape::Mesh { file: typed, metres_per_unit } => {
+            Some(file(format!("tools.{name}.shape.mesh.file"), &typed.0, Some(*metres_per_unit)))
+        }
+        _ => None,
+    });
+    let motions = raw.objects.iter().filter_map(|(name, object)| {
+        let recorded = object.training.recorded.as_ref()?;
+        Some(file(format!("objects.{name}.training.recorded.file"), &recorded.file.0, None))
+    });
+    meshes.chain(motions).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::Value;
+
+    use super::*;
+    use crate::scene::raw::RawConfig;
+
+    const SCENE: &str = r#"
+[objects.block]
+mesh = { generator = "block", size_m = [0.04, 0.04, 0.02] }
+material = { young_modulus_pa = 3e4, poisson_ratio = 0.4, density_kg_per_m3 = 1000.0 }
+training = { recorded = { file = "press.csv" } }
+[tools.fork]
+shape = { mesh = { file = "fork.obj" } }
+"#;
+
+    /// Paths of keys whose type is `RawFile`, without the names of tables.
+    fn file_keys(schema: &Value) -> Vec<String> {
+        let definitions = schema["$defs"].as_object().into_iter().flatten();
+        let named = definitions.flat_map(|(owner, definition)| {
+            let mut keys = Vec::new();
+            collect(owner, definition, &mut keys);
+            keys
+        });
+        named.collect()
+    }
+
+    fn collect(at: &str, value: &Value, keys: &mut Vec<String>) {
+        match value {
+            Value::Object(map) if map.get("$ref").is_some_and(|r| r == "#/$defs/RawFile") => keys.push(at.to_owned()),
+            Value::Object(map) => map.iter().for_each(|(key, inner)| collect(&format!("{at}.{key}"), inner, keys)),
+            Value::Array(items) => items.iter().for_each(|inner| collect(at, inner, keys)),
+            _ => {}
+        }
+    }
+
+    #[test]
+    fn every_key_of_the_type_file_is_listed_and_no_other() {
+        let schema = serde_json::to_value(schemars::schema_for!(RawConfig)).expect("a schema is JSON");
+        let listed = named_files(Path::new("scenes/fork.toml"), SCENE);
+        let paths: Vec<_> = listed.iter().map(|file| file.path.display().to_string()).collect();
+        assert_eq!(paths, ["scenes/fork.obj", "scenes/press.csv"]);
+        let keys = file_keys(&schema);
+        assert_eq!(keys.len(), listed.len(), "a key of type RawFile is not in `list`: {keys:?}");
+    }
+}

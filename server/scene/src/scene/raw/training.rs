@@ -1,0 +1,239 @@
+//! What a scene says about its accurate model and about training, as typed.
+
+#![allow(rustdoc::broken_intra_doc_links, reason = "units in brackets; the schema shows this text as it is")]
+
+use plica_training::{DriveOptions, FeatureScales};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::{RawBox, RawFile};
+
+/// Quasi-static model that examples are made with. Supports and regions are the object's.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawAccurate {
+    /// Hexahedra along x, y, z; three times the coarse ones where left out.
+    pub divisions: Option<[u32; 3]>,
+    /// Material law.
+    pub model: RawMaterialModel,
+    /// Young's modulus in place of the object's [Pa], 10 to 1e9.
+    pub young_modulus_pa: Option<f64>,
+    /// Poisson's ratio in place of the object's [-], 0 to 0.4999.
+    pub poisson_ratio: Option<f64>,
+}
+
+/// Material laws of the accurate model, each with mean dilatation.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RawMaterialModel {
+    /// Finite everywhere, inverted elements included.
+    #[default]
+    StableNeoHookean,
+    /// Infinite where volume vanishes.
+    CompressibleNeoHookean,
+    /// Small strains; not invariant under rotations.
+    Linear,
+}
+
+/// How the accurate skin is tied to the imprint of the tool on the coarse one.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawTie {
+    /// A pressure of Young's modulus stretches the tie by this much [m], 1e-8 to 0.01.
+    pub compliance_m: f64,
+    /// Skin vertices nearer to the tool than this are tied [m], 1e-5 to 0.05.
+    pub band_m: f64,
+    /// Share of the stiffness left where the band ends [-], 1e-8 to 1; between, it falls exponentially.
+    pub rim_floor: f64,
+}
+
+/// What `plicad train` does.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawTraining {
+    /// Tool that interacts; the first one by name where left out.
+    pub tool: Option<String>,
+    /// Interactions, 1 to 100000.
+    pub examples: u32,
+    /// Seed of the interactions.
+    pub seed: u64,
+    /// How interactions are chosen among those that are drawn.
+    pub sampling: RawInteractionSampling,
+    /// Farthest points: how many are drawn for each one kept, 2 to 1000.
+    pub candidates_per_example: u32,
+    /// Farthest points: what contact points, and what presses and drags are divided by [m], 1e-6 to 10.
+    pub feature_scales_m: [f64; 2],
+    /// Boxes on the resting skin that contact points lie in; none: wherever the skin faces the tool.
+    pub contact_regions: Vec<RawBox>,
+    /// Direction of the press: "vertical" (down), "normal" (against the skin), or x, y, z. The tool's z axis points the other way.
+    pub approach: RawApproach,
+    /// Least and largest depth beyond first touch, as a share of the thickness there along the approach, 0.001 to 0.95.
+    pub depth_share: [f64; 2],
+    /// Least and largest length of the drag along the skin's tangent plane [m], 0 to 1.
+    pub drag_m: [f64; 2],
+    /// Share of the interactions that drag, 0 to 1.
+    pub drag_share: f64,
+    /// States picked from a recorded motion, in place of drawn ones.
+    pub recorded: Option<RawRecorded>,
+    /// Axis along whose tangential part stamps are laid out, and one that stands in where it is normal to the skin.
+    pub stamp_axes: [[f64; 3]; 2],
+    /// How the real-time model is driven to a pose.
+    pub drive: RawDrive,
+    /// Interactions that are never trained on.
+    pub evaluation: RawEvaluation,
+}
+
+/// How interactions are chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RawInteractionSampling {
+    /// Those that lie as far from each other as can be.
+    FarthestPoint,
+    /// As they are drawn.
+    Random,
+}
+
+/// Direction of a press.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "approach is \"vertical\", \"normal\", or a direction [x, y, z]")]
+pub enum RawApproach {
+    /// By name.
+    Named(RawApproachName),
+    /// Towards x, y, z; need not be of unit length.
+    Direction([f64; 3]),
+}
+
+/// Directions with a name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RawApproachName {
+    /// Along -z.
+    Vertical,
+    /// Against the skin's normal.
+    Normal,
+}
+
+/// A recorded motion.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawRecorded {
+    /// Poses, as `plicad simulate` reads them: CSV or a TUM trajectory. Path relative to the scene file.
+    pub file: RawFile,
+    /// Whether the trajectory's box is mapped into the room above the object.
+    #[serde(default)]
+    pub fit: bool,
+}
+
+/// How the real-time model is driven to a pose, and when it counts as settled.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawDrive {
+    /// Speed of the tool [m/s], 1e-3 to 1.
+    pub speed_m_per_s: f64,
+    /// Least damping proportional to mass while training [1/s], 0 to 1000; what is at rest does not depend on it.
+    pub mass_damping_per_s: f64,
+    /// Settled if no node has moved farther than this [m], 1e-8 to 0.01 ...
+    pub settled_m: f64,
+    /// ... within this time [s], 0.001 to 10.
+    pub window_s: f64,
+    /// Longest wait for that [s], 0.01 to 600.
+    pub patience_s: f64,
+    /// What is not settled by then is rejected if a node still moves farther than this within the window [m], 1e-8 to 0.01.
+    pub tolerated_m: f64,
+}
+
+/// Interactions that are never trained on.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct RawEvaluation {
+    /// Interactions drawn at random as those of training are, 1 to 100000.
+    pub examples: u32,
+    /// Seed; another one than that of training.
+    pub seed: u64,
+    /// Sets outside of what is trained.
+    pub outside: Vec<RawOutside>,
+}
+
+/// A set of interactions outside of what is trained. Keys left out are those of training.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawOutside {
+    /// Kind of its examples in the database; several sets may share it.
+    pub name: String,
+    /// What happens at the contact point.
+    #[serde(default)]
+    pub action: RawAction,
+    /// Interactions, 1 to 100000.
+    pub examples: u32,
+    /// Boxes on the resting skin that contact points lie in.
+    pub contact_regions: Option<Vec<RawBox>>,
+    /// Direction of the press.
+    pub approach: Option<RawApproach>,
+    /// Least and largest depth, or height of a lift, as a share of the local thickness.
+    pub depth_share: Option<[f64; 2]>,
+    /// Least and largest length of the drag [m].
+    pub drag_m: Option<[f64; 2]>,
+    /// Share of the interactions that drag.
+    pub drag_share: Option<f64>,
+}
+
+/// What happens at a contact point.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RawAction {
+    /// The tool presses and drags.
+    #[default]
+    Press,
+    /// Suction on a disc of the tool's radius lifts the skin.
+    Lift,
+}
+
+impl Default for RawTie {
+    fn default() -> Self {
+        let d = plica_accurate::TieOptions::for_modulus(1.0);
+        Self { compliance_m: d.compliance_m, band_m: d.band_m, rim_floor: d.rim_floor }
+    }
+}
+
+impl Default for RawTraining {
+    fn default() -> Self {
+        let scales = FeatureScales::default();
+        Self {
+            tool: None,
+            examples: 128,
+            seed: 1,
+            sampling: RawInteractionSampling::FarthestPoint,
+            candidates_per_example: 2,
+            feature_scales_m: [scales.contact_m, scales.motion_m],
+            contact_regions: Vec::new(),
+            approach: RawApproach::Named(RawApproachName::Vertical),
+            depth_share: [0.1, 0.35],
+            drag_m: [0.0, 0.005],
+            drag_share: 2.0 / 3.0,
+            recorded: None,
+            stamp_axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            drive: RawDrive::default(),
+            evaluation: RawEvaluation::default(),
+        }
+    }
+}
+
+impl Default for RawDrive {
+    fn default() -> Self {
+        let d = DriveOptions::default();
+        Self {
+            speed_m_per_s: d.speed_m_per_s,
+            mass_damping_per_s: d.mass_damping_per_s,
+            settled_m: d.settled_m,
+            window_s: d.window_s,
+            patience_s: d.patience_s,
+            tolerated_m: d.tolerated_m,
+        }
+    }
+}
+
+impl Default for RawEvaluation {
+    fn default() -> Self {
+        Self { examples: 120, seed: 2, outside: Vec::new() }
+    }
+}

@@ -1,0 +1,201 @@
+//! `[objects.<name>.training]`, checked.
+
+use nalgebra::{Point3, Vector3};
+use plica_sim::ToolDescription;
+use plica_training::{Approach, DriveOptions, FeatureScales, PressRanges};
+
+use super::raw::{
+    RawAction, RawApproach, RawApproachName, RawBox, RawDrive, RawInteractionSampling, RawOutside, RawTraining,
+};
+use crate::checks::Check;
+use crate::error::ConfigError;
+
+const MAX_EXAMPLES: u32 = 100_000;
+/// A direction shorter than this is none.
+const SHORTEST_DIRECTION: f64 = 1e-6;
+
+/// What `plicad train` does.
+#[derive(Debug, Clone)]
+pub struct TrainingConfig {
+    /// Tool that interacts, by index; `None` in a scene without tools.
+    pub tool: Option<usize>,
+    /// Interactions.
+    pub examples: u32,
+    /// Seed of the interactions.
+    pub seed: u64,
+    /// How many are drawn for each one that farthest-point sampling keeps; 1: as they are drawn.
+    pub candidates_per_example: u32,
+    /// What the features of farthest-point sampling are divided by.
+    pub features: FeatureScales,
+    /// Ranges of drawn interactions.
+    pub ranges: PressRanges,
+    /// A recorded motion in place of drawn interactions.
+    pub recorded: Option<RecordedConfig>,
+    /// Stamp axis, and the one that stands in.
+    pub stamp_axes: [Vector3<f64>; 2],
+    /// How the real-time model is driven to a pose.
+    pub drive: DriveOptions,
+    /// Interactions of an evaluation in the trained region.
+    pub evaluation_examples: u32,
+    /// Seed of an evaluation.
+    pub evaluation_seed: u64,
+    /// Sets outside of what is trained.
+    pub outside: Vec<OutsideConfig>,
+}
+
+/// A recorded motion.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RecordedConfig {
+    /// Path as typed, relative to the scene file.
+    pub file: String,
+    /// Whether it is mapped into the room above the object.
+    pub fit: bool,
+}
+
+/// A set of interactions outside of what is trained.
+#[derive(Debug, Clone)]
+pub struct OutsideConfig {
+    /// Kind of its examples.
+    pub name: String,
+    /// Suction instead of a press.
+    pub lifts: bool,
+    /// Interactions.
+    pub examples: u32,
+    /// Their ranges.
+    pub ranges: PressRanges,
+}
+
+pub(super) fn check(
+    c: &Check<'_>,
+    key: &str,
+    raw: &RawTraining,
+    tools: &[ToolDescription],
+) -> Result<TrainingConfig, ConfigError> {
+    let at = |name: &str| format!("{key}.{name}");
+    let ranges = PressRanges {
+        region: check_boxes(c, &at("contact_regions"), &raw.contact_regions)?,
+        approach: check_approach(c, &at("approach"), &raw.approach)?,
+        depth_share: range(c, &at("depth_share"), raw.depth_share, [1e-3, 0.95])?,
+        drag_m: range(c, &at("drag_m"), raw.drag_m, [0.0, 1.0])?,
+        drag_share: c.number(&at("drag_share"), raw.drag_share, 0.0, 1.0)?,
+    };
+    let [contact_m, motion_m] = raw.feature_scales_m;
+    let evaluation = &raw.evaluation;
+    if evaluation.seed == raw.seed {
+        let problem = format!("{} is the seed of training as well", raw.seed);
+        return Err(c.error(&at("evaluation.seed"), problem, "choose another one: what is trained on proves nothing"));
+    }
+    let outside = evaluation.outside.iter().enumerate();
+    let outside = outside.map(|(i, set)| check_outside(c, &at(&format!("evaluation.outside.{i}")), set, &ranges));
+    Ok(TrainingConfig {
+        tool: check_tool(c, &at("tool"), raw.tool.as_deref(), tools)?,
+        examples: c.count(&at("examples"), raw.examples, 1, MAX_EXAMPLES)?,
+        seed: raw.seed,
+        candidates_per_example: match raw.sampling {
+            RawInteractionSampling::Random => 1,
+            RawInteractionSampling::FarthestPoint => {
+                c.count(&at("candidates_per_example"), raw.candidates_per_example, 2, 1000)?
+            }
+        },
+        features: FeatureScales {
+            contact_m: c.number(&at("feature_scales_m"), contact_m, 1e-6, 10.0)?,
+            motion_m: c.number(&at("feature_scales_m"), motion_m, 1e-6, 10.0)?,
+        },
+        recorded: raw.recorded.as_ref().map(|r| RecordedConfig { file: r.file.0.clone(), fit: r.fit }),
+        stamp_axes: [
+            direction(c, &at("stamp_axes"), raw.stamp_axes[0])?,
+            direction(c, &at("stamp_axes"), raw.stamp_axes[1])?,
+        ],
+        drive: check_drive(c, &at("drive"), &raw.drive)?,
+        evaluation_examples: c.count(&at("evaluation.examples"), evaluation.examples, 1, MAX_EXAMPLES)?,
+        evaluation_seed: evaluation.seed,
+        outside: outside.collect::<Result<_, _>>()?,
+        ranges,
+    })
+}
+
+fn check_tool(
+    c: &Check<'_>,
+    key: &str,
+    name: Option<&str>,
+    tools: &[ToolDescription],
+) -> Result<Option<usize>, ConfigError> {
+    let Some(name) = name else { return Ok((!tools.is_empty()).then_some(0)) };
+    tools.iter().position(|t| t.name == name).map(Some).ok_or_else(|| {
+        let names: Vec<_> = tools.iter().map(|t| t.name.as_str()).collect();
+        c.error(key, format!("there is no tool `{name}`"), format!("name one of: {}", names.join(", ")))
+    })
+}
+
+fn check_outside(
+    c: &Check<'_>,
+    key: &str,
+    raw: &RawOutside,
+    training: &PressRanges,
+) -> Result<OutsideConfig, ConfigError> {
+    let at = |name: &str| format!("{key}.{name}");
+    c.name(&at("name"), &raw.name)?;
+    let lifts = raw.action == RawAction::Lift;
+    if lifts {
+        c.absent(&at("drag_m"), &raw.drag_m, "action = \"lift\"")?;
+        c.absent(&at("drag_share"), &raw.drag_share, "action = \"lift\"")?;
+    }
+    let boxes = raw.contact_regions.as_ref().map(|b| check_boxes(c, &at("contact_regions"), b));
+    let approach = raw.approach.as_ref().map(|a| check_approach(c, &at("approach"), a));
+    let depth = raw.depth_share.map(|d| range(c, &at("depth_share"), d, [1e-3, 0.95]));
+    let drag = raw.drag_m.map(|d| range(c, &at("drag_m"), d, [0.0, 1.0]));
+    let share = raw.drag_share.map(|s| c.number(&at("drag_share"), s, 0.0, 1.0));
+    Ok(OutsideConfig {
+        name: raw.name.clone(),
+        lifts,
+        examples: c.count(&at("examples"), raw.examples, 1, MAX_EXAMPLES)?,
+        ranges: PressRanges {
+            region: boxes.transpose()?.unwrap_or_else(|| training.region.clone()),
+            approach: approach.transpose()?.unwrap_or(training.approach),
+            depth_share: depth.transpose()?.unwrap_or(training.depth_share),
+            drag_m: drag.transpose()?.unwrap_or(training.drag_m),
+            drag_share: share.transpose()?.unwrap_or(training.drag_share),
+        },
+    })
+}
+
+fn check_boxes(c: &Check<'_>, key: &str, raw: &[RawBox]) -> Result<Vec<[Point3<f64>; 2]>, ConfigError> {
+    let boxes = raw.iter().enumerate();
+    boxes.map(|(i, b)| c.corners(&format!("{key}.{i}"), b.min_m, b.max_m)).collect()
+}
+
+fn check_approach(c: &Check<'_>, key: &str, raw: &RawApproach) -> Result<Approach, ConfigError> {
+    Ok(match raw {
+        RawApproach::Named(RawApproachName::Normal) => Approach::Normal,
+        RawApproach::Named(RawApproachName::Vertical) => Approach::Along(Vector3::new(0.0, 0.0, -1.0)),
+        RawApproach::Direction(towards) => Approach::Along(direction(c, key, *towards)?),
+    })
+}
+
+fn check_drive(c: &Check<'_>, key: &str, raw: &RawDrive) -> Result<DriveOptions, ConfigError> {
+    let number = |name: &str, value, least, most| c.number(&format!("{key}.{name}"), value, least, most);
+    Ok(DriveOptions {
+        speed_m_per_s: number("speed_m_per_s", raw.speed_m_per_s, 1e-3, 1.0)?,
+        mass_damping_per_s: number("mass_damping_per_s", raw.mass_damping_per_s, 0.0, 1e3)?,
+        settled_m: number("settled_m", raw.settled_m, 1e-8, 0.01)?,
+        window_s: number("window_s", raw.window_s, 1e-3, 10.0)?,
+        patience_s: number("patience_s", raw.patience_s, 0.01, 600.0)?,
+        tolerated_m: number("tolerated_m", raw.tolerated_m, 1e-8, 0.01)?,
+    })
+}
+
+/// Least and largest, in this order.
+fn range(c: &Check<'_>, key: &str, value: [f64; 2], [least, most]: [f64; 2]) -> Result<[f64; 2], ConfigError> {
+    value.iter().try_for_each(|v| c.number(key, *v, least, most).map(drop))?;
+    if value[0] <= value[1] {
+        return Ok(value);
+    }
+    Err(c.error(key, format!("{value:?} falls"), "give the smaller number first"))
+}
+
+fn direction(c: &Check<'_>, key: &str, value: [f64; 3]) -> Result<Vector3<f64>, ConfigError> {
+    let vector = c.vector(key, value)?;
+    vector.try_normalize(SHORTEST_DIRECTION).ok_or_else(|| {
+        c.error(key, format!("{value:?} has no direction; its length must be 1e-6 or more"), "down is [0, 0, -1]")
+    })
+}

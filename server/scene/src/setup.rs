@@ -1,0 +1,110 @@
+//! From a checked scene to the set-up of training.
+
+use std::path::Path;
+
+use nalgebra::{Isometry3, Translation3};
+use plica_sim::ToolDescription;
+use plica_training::{InteractionSet, RecordedPose, Setup, Source};
+
+use crate::hash::{HashError, scene_hash};
+use crate::model::{self, SceneModelError};
+use crate::motion::{self, MotionError};
+use crate::scene::{Config, TrainingConfig};
+
+/// Why there is nothing to train.
+#[derive(Debug, thiserror::Error)]
+pub enum SetupError {
+    /// The scene makes no model.
+    #[error(transparent)]
+    Scene(#[from] SceneModelError),
+    /// A file that the scene names cannot be read.
+    #[error(transparent)]
+    Hash(#[from] HashError),
+    /// The recorded motion cannot be used.
+    #[error("objects.{object}.training.recorded: {source}")]
+    Motion {
+        /// The object.
+        object: String,
+        /// Why.
+        source: MotionError,
+    },
+    /// Nothing touches the object.
+    #[error("{file}: the scene has no tool to train with; add a table [tools.<name>]")]
+    NoTool {
+        /// The scene.
+        file: String,
+    },
+}
+
+/// What training is told about a scene.
+///
+/// # Errors
+/// See [`SetupError`].
+pub fn setup(config: &Config) -> Result<Setup, SetupError> {
+    let training = config.training();
+    let no_tool = || SetupError::NoTool { file: config.file().display().to_string() };
+    let tool = training.tool.ok_or_else(no_tool)?;
+    Ok(Setup {
+        scene_hash: scene_hash(config)?,
+        coarse: model::describe(config)?,
+        accurate: model::describe_accurate(config, None)?,
+        tie: config.object().tie(),
+        stamp_axes: training.stamp_axes,
+        drive: training.drive,
+        features: training.features,
+        training: trained_set(config, training, tool)?,
+        training_seed: training.seed,
+        evaluation: evaluation_sets(config, training, tool)?,
+        evaluation_seed: training.evaluation_seed,
+    })
+}
+
+fn trained_set(config: &Config, training: &TrainingConfig, tool: usize) -> Result<InteractionSet, SetupError> {
+    Ok(InteractionSet {
+        name: IN_REGION.to_owned(),
+        tool,
+        count: training.examples as usize,
+        candidates_per_example: training.candidates_per_example as usize,
+        source: source(config, training, tool)?,
+    })
+}
+
+/// Kind of the examples in the trained region.
+const IN_REGION: &str = "in_region";
+
+fn evaluation_sets(config: &Config, training: &TrainingConfig, tool: usize) -> Result<Vec<InteractionSet>, SetupError> {
+    let in_region = InteractionSet {
+        count: training.evaluation_examples as usize,
+        candidates_per_example: 1,
+        ..trained_set(config, training, tool)?
+    };
+    let outside = training.outside.iter().map(|set| InteractionSet {
+        name: set.name.clone(),
+        tool,
+        count: set.examples as usize,
+        candidates_per_example: 1,
+        source: if set.lifts { Source::Lift(set.ranges.clone()) } else { Source::Press(set.ranges.clone()) },
+    });
+    Ok(std::iter::once(in_region).chain(outside).collect())
+}
+
+fn source(config: &Config, training: &TrainingConfig, tool: usize) -> Result<Source, SetupError> {
+    let Some(recorded) = &training.recorded else { return Ok(Source::Press(training.ranges.clone())) };
+    let path = config.file().parent().unwrap_or(Path::new("")).join(&recorded.file);
+    let name = config.tools()[tool].name.clone();
+    let (poses, _) = motion::read(&path, config, Some(&name), recorded.fit)
+        .map_err(|source| SetupError::Motion { object: config.object().name().to_owned(), source })?;
+    let pose = |timed: &motion::TimedPose| RecordedPose {
+        time_s: timed.time_s,
+        tool: timed.tool,
+        pose: world_from_tool(&config.tools()[timed.tool], &timed.sample.pose),
+    };
+    Ok(Source::Recorded(poses.iter().map(pose).collect()))
+}
+
+/// As the simulation places tools: `world_from_tracker * scaled(tracker_from_marker) * tool_from_marker^-1`.
+fn world_from_tool(tool: &ToolDescription, tracker_from_marker: &Isometry3<f64>) -> Isometry3<f64> {
+    let scaled = Translation3::from(tracker_from_marker.translation.vector * tool.position_scale);
+    let scaled = Isometry3::from_parts(scaled, tracker_from_marker.rotation);
+    tool.world_from_tracker * scaled * tool.tool_from_marker.inverse()
+}
