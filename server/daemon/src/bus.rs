@@ -5,6 +5,7 @@
 
 mod activate;
 mod counters;
+mod error;
 mod guard;
 mod intake;
 mod jobs;
@@ -13,8 +14,11 @@ mod port_owner;
 mod pose_gate;
 mod poses;
 mod replies;
+mod requests;
 mod rpc;
+mod scene_info;
 mod session;
+mod shared;
 mod skin;
 mod status;
 mod wrench;
@@ -26,7 +30,6 @@ use std::time::{Duration, Instant};
 
 use plica_jobs::Jobs;
 use plica_protocol::keys::Keys;
-use plica_scene::scene::PublishConfig;
 use plica_sim::Model;
 use zenoh::{Session, Wait};
 
@@ -34,63 +37,14 @@ use crate::database_loader::Enrichment;
 use crate::realtime::{Grants, Ports};
 
 use counters::SharedCounters;
+pub use error::BusError;
 use intake::PoseIntake;
+pub use scene_info::SceneInfo;
 pub use session::{BusOptions, DEFAULT_ZENOH_CONFIG};
+use shared::Shared;
 
 /// `Session::close` can hang for ten seconds when a client is frozen.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
-
-/// Why the bus cannot be opened. Each message says what to do.
-#[derive(Debug, thiserror::Error)]
-pub enum BusError {
-    /// The address is taken.
-    #[error(
-        "cannot listen on {endpoint}: the address is in use{owner}; stop that program, or choose another address with --listen"
-    )]
-    AddressInUse {
-        /// What was asked for.
-        endpoint: String,
-        /// Who has it, as far as can be seen.
-        owner: String,
-    },
-    /// The configuration file cannot be used.
-    #[error("{file}: {problem}; see configs/zenoh for working files")]
-    Config {
-        /// The file.
-        file: String,
-        /// What Zenoh said.
-        problem: String,
-    },
-    /// The session name cannot be part of a key.
-    #[error("--session: {0}")]
-    Session(#[from] plica_protocol::keys::NameError),
-    /// Anything else that Zenoh says.
-    #[error("the bus cannot be opened on {endpoint}: {problem}")]
-    Zenoh {
-        /// What was asked for.
-        endpoint: String,
-        /// What Zenoh said.
-        problem: String,
-    },
-    /// A thread cannot be started.
-    #[error("a thread cannot be started: {0}")]
-    Thread(#[from] std::io::Error),
-}
-
-/// What the bus needs to know of the scene.
-#[derive(Debug, Clone)]
-pub struct Scene {
-    /// Name of the scene.
-    pub name: String,
-    /// Name of the object.
-    pub object: String,
-    /// Names of the tools, in the model's order.
-    pub tools: Vec<String>,
-    /// When each tool is stale \[s\].
-    pub stale_after_s: Vec<f64>,
-    /// Rates and format.
-    pub publish: PublishConfig,
-}
 
 /// What a bus is made of.
 pub struct Parts {
@@ -99,7 +53,7 @@ pub struct Parts {
     /// Keys of the session.
     pub keys: Keys,
     /// What there is to publish.
-    pub scene: Scene,
+    pub scene: SceneInfo,
     /// The scene's model.
     pub model: Arc<Model>,
     /// What makes examples ready.
@@ -127,20 +81,6 @@ struct Declared {
     _poses: zenoh::pubsub::Subscriber<()>,
     _queryables: Vec<zenoh::query::Queryable<()>>,
     _alive: zenoh::liveliness::LivelinessToken,
-}
-
-/// What the bus threads share.
-struct Shared {
-    session: Session,
-    keys: Keys,
-    scene: Scene,
-    model: Arc<Model>,
-    enrichment: Enrichment,
-    intake: Arc<PoseIntake>,
-    counters: Arc<SharedCounters>,
-    jobs: Jobs,
-    stop: Arc<AtomicBool>,
-    started: Instant,
 }
 
 impl Bus {
@@ -211,21 +151,6 @@ impl Bus {
     }
 }
 
-impl Shared {
-    fn stopping(&self) -> bool {
-        self.stop.load(Relaxed)
-    }
-
-    fn error(&self, problem: zenoh::Error) -> BusError {
-        BusError::Zenoh { endpoint: self.keys.root().to_owned(), problem: problem.to_string() }
-    }
-}
-
 fn alive(shared: &Shared) -> Result<zenoh::liveliness::LivelinessToken, BusError> {
     shared.session.liveliness().declare_token(shared.keys.alive()).wait().map_err(|e| shared.error(e))
-}
-
-/// Starts a named thread.
-fn spawn(name: &str, body: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>, BusError> {
-    Ok(std::thread::Builder::new().name(name.into()).spawn(body)?)
 }

@@ -8,7 +8,7 @@ use plica_scene::Config;
 use plica_scene::model::{self, SceneModelError};
 use plica_sim::Model;
 
-use crate::bus::{Bus, BusError, BusOptions, Parts, Scene};
+use crate::bus::{Bus, BusError, BusOptions, Parts, SceneInfo};
 use crate::database_loader::{Enrichment, EnrichmentError};
 use crate::limits::{FrameTooLarge, check_frame};
 use crate::realtime::{Grants, Loop, LoopOptions, Running, ThreadOptions, spawn};
@@ -114,8 +114,8 @@ fn thread_options(config: &Config) -> ThreadOptions {
     ThreadOptions { priority: runtime.realtime_priority(), cpu: runtime.cpu(), lock_memory: runtime.lock_memory() }
 }
 
-fn describe(config: &Config) -> Scene {
-    Scene {
+fn describe(config: &Config) -> SceneInfo {
+    SceneInfo {
         name: config.name().to_owned(),
         object: config.object().name().to_owned(),
         tools: config.tools().iter().map(|t| t.name.clone()).collect(),

@@ -9,24 +9,17 @@ use std::time::Duration;
 
 use plica_protocol::jobs::JobFile;
 use plica_protocol::rpc::{ActivateRequest, ErrorCode, ErrorReply, decode_request};
-use plica_sim::enrichment::LiveEnrichment;
 use zenoh::query::Query;
 
+use super::error::BusError;
 use super::replies::Replies;
-use super::rpc::{Request, refused};
-use super::{BusError, Shared, spawn};
+use super::requests::{Activation, Request, refused};
+use super::shared::{Shared, spawn};
 use crate::database_loader::Ready;
 
 /// Requests that may wait: none but the next.
 const QUEUE: usize = 1;
 const LOOK_AT_STOP: Duration = Duration::from_millis(100);
-
-/// Examples that are ready, and who waits for them.
-pub(super) struct Activation {
-    pub(super) query: Query,
-    pub(super) live: Box<LiveEnrichment>,
-    pub(super) n_examples: usize,
-}
 
 /// Starts the thread; what goes into the channel comes out of `orders` once it is ready.
 pub(super) fn start(

@@ -9,8 +9,8 @@ use plica_protocol::rpc::{ErrorCode, ErrorReply, StepPose};
 use plica_protocol::status::{Counters, QUEUE_FULL};
 use plica_sim::{PoseSample, ToolPose};
 
-use super::Scene;
 use super::pose_gate::PoseGate;
+use super::scene_info::SceneInfo;
 use crate::realtime::MAX_STEP_POSES;
 use crate::wire;
 
@@ -27,7 +27,7 @@ struct Tool {
 }
 
 impl PoseIntake {
-    pub(super) fn new(scene: &Scene, queues: Vec<rtrb::Producer<PoseSample>>) -> Self {
+    pub(super) fn new(scene: &SceneInfo, queues: Vec<rtrb::Producer<PoseSample>>) -> Self {
         let tool = |(stale_after_s, queue): (&f64, _)| Mutex::new(Tool { gate: PoseGate::new(*stale_after_s), queue });
         Self {
             names: scene.tools.clone(),

@@ -16,9 +16,10 @@ use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::Query;
 
+use super::error::BusError;
 use super::replies::{Content, Replies};
-use super::rpc::json;
-use super::{BusError, Shared, spawn};
+use super::requests::json;
+use super::shared::{Shared, spawn};
 
 /// Requests that may wait.
 const QUEUE: usize = 16;

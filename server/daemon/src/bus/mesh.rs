@@ -11,10 +11,10 @@ use sha2::{Digest, Sha256};
 use zenoh::Wait;
 use zenoh::query::{Query, Queryable};
 
+use super::error::BusError;
 use super::guard::guarded;
 use super::replies::{Content, Replies};
-use super::skin::unknown_object;
-use super::{BusError, Shared};
+use super::shared::Shared;
 
 pub(super) fn declare(shared: &Arc<Shared>, replies: Replies) -> Result<Queryable<()>, BusError> {
     let mesh = Mesh::new(shared);
@@ -46,7 +46,7 @@ impl Mesh {
     }
 
     fn answer(&self, shared: &Shared, query: &Query) -> Result<Content, ErrorReply> {
-        if let Some(error) = unknown_object(shared, query.key_expr().as_str()) {
+        if let Some(error) = shared.unknown_object(query.key_expr().as_str()) {
             return Err(error);
         }
         let offset = offset_of(query.parameters().as_str())?;

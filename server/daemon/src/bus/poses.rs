@@ -9,8 +9,9 @@ use zenoh::bytes::Encoding;
 use zenoh::pubsub::Subscriber;
 use zenoh::sample::{Sample, SampleKind};
 
+use super::error::BusError;
 use super::guard::guarded;
-use super::{BusError, Shared};
+use super::shared::Shared;
 
 pub(super) fn declare(shared: &Arc<Shared>) -> Result<Subscriber<()>, BusError> {
     let json = Encoding::from(ENCODING_JSON);

@@ -12,7 +12,8 @@ use zenoh::Wait;
 use zenoh::bytes::Encoding;
 use zenoh::query::Query;
 
-use super::{BusError, Shared, spawn};
+use super::error::BusError;
+use super::shared::{Shared, spawn};
 
 /// Replies that may wait; each holds at most 512 KiB, or a skin frame.
 const QUEUE: usize = 64;

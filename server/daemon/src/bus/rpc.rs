@@ -2,7 +2,7 @@
 //! handed to other threads.
 
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -10,14 +10,15 @@ use plica_protocol::keys::is_wildcard;
 use plica_protocol::rpc::{
     EmptyRequest, ErrorCode, ErrorReply, MAX_STEP_TICKS, Method, RestoreRequest, StepRequest, decode_request,
 };
-use serde::Serialize;
 use zenoh::Wait;
 use zenoh::query::{Query, Queryable};
 
-use super::activate::{self, Activation};
+use super::activate;
+use super::error::BusError;
 use super::guard::guarded;
 use super::replies::{Content, Replies};
-use super::{BusError, Shared, spawn};
+use super::requests::{Activation, Request, json, refused};
+use super::shared::{Shared, spawn};
 use crate::realtime::{Command, CommandPort, Outcome};
 use crate::wire;
 
@@ -26,23 +27,6 @@ const QUEUE: usize = 16;
 /// How long the simulation may take to obey.
 const PATIENCE: Duration = Duration::from_secs(10);
 const LOOK_AT_STOP: Duration = Duration::from_millis(100);
-
-/// What waits for the simulation.
-pub(super) enum Request {
-    /// A question as it came.
-    Ask(Query),
-    /// Examples that are ready.
-    Activate(Box<Activation>),
-}
-
-impl Request {
-    pub(super) fn into_query(self) -> Query {
-        match self {
-            Self::Ask(query) => query,
-            Self::Activate(activation) => activation.query,
-        }
-    }
-}
 
 pub(super) fn start(
     shared: &Arc<Shared>,
@@ -58,7 +42,7 @@ pub(super) fn start(
         let refused = match method {
             Some(Method::Activate) => activate_in.try_send(query).err().map(refused),
             Some(method) if method.is_about_jobs() => job_requests.try_send(query).err().map(refused),
-            _ => requests_in.try_send(Request::Ask(query)).err().map(|error| refused(error).into_query()),
+            _ => requests_in.try_send(Request::Query(query)).err().map(|error| refused(error).into_query()),
         };
         if let Some(query) = refused {
             busy.send(query, Err(ErrorReply::new(ErrorCode::Busy, "too many requests are waiting")));
@@ -68,12 +52,6 @@ pub(super) fn start(
     let queryable = queryable.wait().map_err(|e| shared.error(e))?;
     let worker = Worker { shared: Arc::clone(shared), port, replies, requests, outstanding: 0 };
     Ok((queryable, [activate_thread, spawn("plica-rpc", move || worker.run())?]))
-}
-
-/// What did not fit into a queue.
-pub(super) fn refused<T>(error: TrySendError<T>) -> T {
-    let (TrySendError::Full(item) | TrySendError::Disconnected(item)) = error;
-    item
 }
 
 struct Worker {
@@ -90,7 +68,7 @@ impl Worker {
         self.port.answered.register_current();
         while !self.shared.stopping() {
             match self.requests.recv_timeout(LOOK_AT_STOP) {
-                Ok(Request::Ask(query)) => self.serve(query),
+                Ok(Request::Query(query)) => self.serve(query),
                 Ok(Request::Activate(activation)) => self.activate(*activation),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return,
@@ -191,8 +169,4 @@ impl Worker {
 fn restore(request: &RestoreRequest) -> Result<Command, ErrorReply> {
     let unknown = |_| ErrorReply::new(ErrorCode::UnknownSnapshot, format!("no snapshot `{}`", request.id));
     request.id.parse().map(|id| Command::Restore { id }).map_err(unknown)
-}
-
-pub(super) fn json(reply: &impl Serialize) -> Result<String, ErrorReply> {
-    serde_json::to_string(reply).map_err(|e| ErrorReply::new(ErrorCode::Internal, e.to_string()))
 }

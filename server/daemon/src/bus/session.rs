@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use plica_protocol::{DEFAULT_ENDPOINT, DEFAULT_SESSION};
 use zenoh::{Config, Session, Wait};
 
-use super::BusError;
+use super::error::BusError;
 use super::port_owner::owner_of_port;
 
 /// What a session is opened with when no file is given.

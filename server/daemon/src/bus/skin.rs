@@ -18,9 +18,12 @@ use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::{Query, Queryable};
 
+use super::error::BusError;
 use super::guard::guarded;
 use super::replies::{Content, Replies};
-use super::{BusError, Shared, spawn};
+use super::requests::refused;
+use super::shared::{Shared, spawn};
+use super::wrench::follow_listeners;
 use crate::realtime::{Frame, FramePort};
 use crate::wire;
 
@@ -51,9 +54,8 @@ pub(super) fn start(
     let busy = replies.clone();
     let callback = guarded(&shared.counters, move |query: Query| match questions_in.try_send(query) {
         Ok(()) => waker.wake(),
-        Err(refused) => {
-            let (std::sync::mpsc::TrySendError::Full(query) | std::sync::mpsc::TrySendError::Disconnected(query)) =
-                refused;
+        Err(error) => {
+            let query = refused(error);
             busy.send(query, Err(ErrorReply::new(ErrorCode::Busy, "too many questions for the skin are waiting")));
         }
     });
@@ -83,7 +85,7 @@ fn declare_publisher(shared: &Arc<Shared>, port: &FramePort) -> Result<Publisher
         .encoding(Encoding::from(ENCODING_BYTES))
         .wait()
         .map_err(|e| shared.error(e))?;
-    super::wrench::follow_listeners(shared, &publisher, &port.listening)?;
+    follow_listeners(shared, &publisher, &port.listening)?;
     Ok(publisher)
 }
 
@@ -123,7 +125,7 @@ impl Worker {
     fn take_questions(&mut self) {
         while let Ok(query) = self.questions.try_recv() {
             let deadline = Instant::now() + PATIENCE;
-            match unknown_object(&self.shared, query.key_expr().as_str()) {
+            match self.shared.unknown_object(query.key_expr().as_str()) {
                 Some(error) => self.replies.send(query, Err(error)),
                 None => self.waiting.push_back(Waiting { query, number: self.port.ask(), deadline }),
             }
@@ -169,15 +171,6 @@ impl Worker {
             self.replies.send(waiting.query, Err(error));
         }
     }
-}
-
-/// The error of a question for an object that the scene does not have. A wildcard asks for the one it has.
-pub(super) fn unknown_object(shared: &Shared, key: &str) -> Option<ErrorReply> {
-    let named = shared.keys.object_of_skin(key).or(shared.keys.object_of_mesh(key));
-    named.filter(|name| *name != shared.scene.object).map(|name| {
-        let message = format!("the scene has no object `{name}`; it has: {}", shared.scene.object);
-        ErrorReply::new(ErrorCode::UnknownObject, message)
-    })
 }
 
 /// Turns frames into bytes.

@@ -17,10 +17,11 @@ use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::{Query, Queryable};
 
+use super::error::BusError;
 use super::guard::guarded;
 use super::replies::{Content, Replies};
+use super::shared::{Shared, spawn};
 use super::skin::Published;
-use super::{BusError, Shared, spawn};
 use crate::realtime::{Grants, Reading, Statistics};
 use crate::wire;
 

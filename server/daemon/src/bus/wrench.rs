@@ -12,8 +12,9 @@ use zenoh::matching::MatchingStatus;
 use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
 
+use super::error::BusError;
 use super::guard::guarded;
-use super::{BusError, Shared, spawn};
+use super::shared::{Shared, spawn};
 use crate::realtime::WrenchPort;
 use crate::wire;
 

@@ -3,7 +3,7 @@
 use plica_sim::enrichment::LiveEnrichment;
 use plica_sim::{Model, Stage, State};
 
-use super::TurnProbe;
+use super::stage_timer::TurnProbe;
 
 /// What enriches the skin, if anything does.
 #[derive(Debug, Default)]

@@ -8,7 +8,10 @@ use triple_buffer::Input;
 
 use super::cadence::Cadence;
 use super::enrichment::Detail;
-use super::{Frame, Reading, Statistics, ToolFrame, TurnProbe, Waker};
+use super::frame::{Frame, Reading, ToolFrame};
+use super::stage_timer::TurnProbe;
+use super::statistics::Statistics;
+use super::waker::Waker;
 
 /// How often the frame of a sleeping object is repeated.
 const SLEEPING_HZ: f64 = 2.0;

@@ -6,7 +6,10 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use plica_sim::PoseSample;
 use triple_buffer::Output;
 
-use super::{Command, Frame, Reading, Reply, Statistics, ToolFrame, Waker};
+use super::command::{Command, Reply};
+use super::frame::{Frame, Reading, ToolFrame};
+use super::statistics::Statistics;
+use super::waker::Waker;
 
 /// Everything that others hold of a running [`Loop`](super::Loop).
 #[derive(Debug)]

@@ -1,6 +1,6 @@
 //! What the operating system grants to the simulation thread, and what is done without.
 
-use super::ThreadOptions;
+use super::thread::ThreadOptions;
 
 /// What was granted. Every refusal has a sentence in `warnings` that says what it means and what to do.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

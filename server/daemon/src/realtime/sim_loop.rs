@@ -7,13 +7,15 @@ use plica_sim::enrichment::LiveEnrichment;
 use plica_sim::{Model, PoseSample, State, TickInput, TickReport, ToolPose, Workspace};
 use triple_buffer::triple_buffer;
 
+use super::command::{Command, Outcome, Refusal, Reply, Returned};
 use super::enrichment::Detail;
+use super::frame::{Frame, Reading};
 use super::outbox::{Cadences, Outbox, Present, ToolOutlet};
+use super::ports::{CommandPort, FramePort, Ports, WrenchPort};
 use super::snapshots::Snapshots;
-use super::{
-    Command, CommandPort, Frame, FramePort, Outcome, Ports, Reading, Refusal, Reply, Returned, Statistics, TurnProbe,
-    Waker, WrenchPort,
-};
+use super::stage_timer::TurnProbe;
+use super::statistics::Statistics;
+use super::waker::Waker;
 
 /// Poses per tool that may wait for a tick.
 const POSE_QUEUE: usize = 256;

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use plica_sim::{Probe, Stage};
 
-use super::Statistics;
+use super::statistics::Statistics;
 
 /// A probe that is also told when the simulation's last stage is over.
 pub trait TurnProbe: Probe {

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicU64;
 
 use plica_sim::Stage;
 
-use super::AtomicHistogram;
+use super::histogram::AtomicHistogram;
 
 /// Written by the simulation thread alone.
 #[derive(Debug, Default)]

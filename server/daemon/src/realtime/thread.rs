@@ -6,8 +6,13 @@ use std::sync::mpsc::sync_channel;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use super::pacing::{Pacer, Plan};
+use super::privileges::Grants;
 use super::privileges::acquire;
-use super::{Grants, Loop, Pacer, Plan, StageTimer, Statistics, Turn, Waker};
+use super::sim_loop::{Loop, Turn};
+use super::stage_timer::StageTimer;
+use super::statistics::Statistics;
+use super::waker::Waker;
 
 /// How long before a deadline a real-time thread stops sleeping and spins. Without `SCHED_FIFO` it never spins: the
 /// scheduler punishes it.

@@ -23,18 +23,23 @@ finish() {
 }
 "#;
 
+/// Short, for tests of processes that do not stop by themselves.
+const GRACE: Duration = Duration::from_millis(300);
+
 /// A data folder and the script that its jobs run.
 pub(crate) struct Workplace {
     folder: TempDir,
     launcher: Option<PathBuf>,
     pub(crate) priority: Priority,
     pub(crate) avoid_cpu: Option<usize>,
+    /// How long a process that was asked to stop may take.
+    pub(crate) grace: Duration,
 }
 
 impl Workplace {
     pub(crate) fn new(script: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let workplace = Self { folder, launcher: None, priority: Priority::Normal, avoid_cpu: None };
+        let workplace = Self { folder, launcher: None, priority: Priority::Normal, avoid_cpu: None, grace: GRACE };
         workplace.replace_script(script);
         workplace
     }
@@ -72,7 +77,7 @@ impl Workplace {
             launcher: self.launcher.clone(),
             priority: self.priority,
             avoid_cpu: self.avoid_cpu,
-            grace: Duration::from_millis(300),
+            grace: self.grace,
         };
         let served = ServedScene { name: "wedge".to_owned(), folder: None, text: BUILT_IN_SCENE.to_owned() };
         let folder = DataFolder::open(&self.path(""), "main").unwrap();

@@ -8,6 +8,7 @@ mod fixture;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
+use std::time::Duration;
 
 use plica_client::protocol::jobs::{JobFetchRequest, JobFile, JobKind, JobState, JobSubmitRequest};
 use plica_jobs::Priority;
@@ -175,7 +176,9 @@ fn a_job_resumed_at_once_after_it_was_cancelled_waits_for_its_old_process() {
     let script = "trap 'sleep 0.2; echo end >>$dir/runs; exit 75' TERM; echo begin >>$dir/runs
         [ $(grep -c begin $dir/runs) -gt 1 ] && finish && exit 0
         while :; do sleep 0.02; done";
-    let workplace = Workplace::new(script);
+    // The old process needs 0.2 s to end, and far more on a loaded machine: it must not be killed before.
+    let mut workplace = Workplace::new(script);
+    workplace.grace = Duration::from_secs(50);
     let daemon = workplace.open();
     let id = daemon.submit("a").id;
     wait_for_file(&workplace.in_job(&id, "runs"));

@@ -1,0 +1,38 @@
+//! Errors of the bus.
+
+/// Why the bus cannot be opened. Each message says what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum BusError {
+    /// The address is taken.
+    #[error(
+        "cannot listen on {endpoint}: the address is in use{owner}; stop that program, or choose another address with --listen"
+    )]
+    AddressInUse {
+        /// What was asked for.
+        endpoint: String,
+        /// Who has it, as far as can be seen.
+        owner: String,
+    },
+    /// The configuration file cannot be used.
+    #[error("{file}: {problem}; see configs/zenoh for working files")]
+    Config {
+        /// The file.
+        file: String,
+        /// What Zenoh said.
+        problem: String,
+    },
+    /// The session name cannot be part of a key.
+    #[error("--session: {0}")]
+    Session(#[from] plica_protocol::keys::NameError),
+    /// Anything else that Zenoh says.
+    #[error("the bus cannot be opened on {endpoint}: {problem}")]
+    Zenoh {
+        /// What was asked for.
+        endpoint: String,
+        /// What Zenoh said.
+        problem: String,
+    },
+    /// A thread cannot be started.
+    #[error("a thread cannot be started: {0}")]
+    Thread(#[from] std::io::Error),
+}
