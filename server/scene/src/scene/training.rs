@@ -94,7 +94,7 @@ pub(super) fn check(
             RawInteractionSampling::Random => 1,
             RawInteractionSampling::FarthestPoint => raw.candidates_per_example,
         },
-        features: FeatureScales { contact_m: contact_m, motion_m: motion_m },
+        features: FeatureScales { contact_m, motion_m },
         recorded: raw.recorded.as_ref().map(|r| RecordedConfig { file: r.file.0.clone(), fit: r.fit }),
         stamp_axes: [
             direction(c, &at("stamp_axes"), raw.stamp_axes[0])?,
