@@ -25,5 +25,15 @@ pub use reading::Reading;
 pub use solution::{LoadStep, Solution};
 pub use support::Support;
 
+use std::sync::OnceLock;
+
+use schemars::Schema;
+
+/// JSON Schema of case files: every key with its meaning, unit and range.
+pub fn schema() -> &'static Schema {
+    static SCHEMA: OnceLock<Schema> = OnceLock::new();
+    SCHEMA.get_or_init(|| schemars::schema_for!(RawCase))
+}
+
 #[cfg(test)]
 mod tests;

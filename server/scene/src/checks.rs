@@ -1,16 +1,14 @@
-//! Range checks that answer with file, line, key, allowed range and advice.
+//! Relations between keys, checked with answers that carry file, line, key and advice. Ranges are checked by `ranges`.
 
-use nalgebra::{Point3, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Point3, Quaternion, UnitQuaternion};
 
 use crate::document::Document;
 use crate::error::ConfigError;
 
 /// How far the length of a typed quaternion may be from 1.
 const UNIT_TOLERANCE: f64 = 1e-2;
-/// Largest coordinate of anything in a scene \[m\].
-const LARGEST_M: f64 = 1e3;
 
-/// Checks values against a document's lines.
+/// Checks of values, with errors at the document's lines.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Check<'a> {
     document: &'a Document,
@@ -29,20 +27,6 @@ impl<'a> Check<'a> {
         self.document.error(key, problem, advice)
     }
 
-    /// `value` if it lies in `[least, most]`.
-    pub(crate) fn number(&self, key: &str, value: f64, least: f64, most: f64) -> Result<f64, ConfigError> {
-        if value.is_finite() && (least..=most).contains(&value) {
-            return Ok(value);
-        }
-        let problem = format!("{value} is outside the allowed range {least} to {most}");
-        Err(self.error(key, problem, format!("choose a value from {least} to {most}")))
-    }
-
-    /// A whole number in `[least, most]`.
-    pub(crate) fn count(&self, key: &str, value: u32, least: u32, most: u32) -> Result<u32, ConfigError> {
-        self.number(key, value.into(), least.into(), most.into()).map(|_| value)
-    }
-
     /// A key that its neighbours make necessary.
     pub(crate) fn required<T>(&self, key: &str, value: Option<T>, because: &str) -> Result<T, ConfigError> {
         value.ok_or_else(|| self.error(key, format!("is missing: {because} needs it"), "add the key"))
@@ -56,24 +40,10 @@ impl<'a> Check<'a> {
         }
     }
 
-    /// Components within 1 km of the origin.
-    pub(crate) fn vector(&self, key: &str, value: [f64; 3]) -> Result<Vector3<f64>, ConfigError> {
-        for component in value {
-            self.number(key, component, -LARGEST_M, LARGEST_M)?;
-        }
-        Ok(value.into())
-    }
-
-    /// A point within 1 km of the origin.
-    pub(crate) fn point(&self, key: &str, value: [f64; 3]) -> Result<Point3<f64>, ConfigError> {
-        self.vector(key, value).map(Point3::from)
-    }
-
     /// Lower and upper corner of a box with positive extents.
     pub(crate) fn corners(&self, key: &str, min: [f64; 3], max: [f64; 3]) -> Result<[Point3<f64>; 2], ConfigError> {
-        let corners = [self.point(&format!("{key}.min_m"), min)?, self.point(&format!("{key}.max_m"), max)?];
         if (0..3).all(|i| min[i] <= max[i]) {
-            return Ok(corners);
+            return Ok([min.into(), max.into()]);
         }
         let problem = format!("{max:?} is below min_m {min:?} in some component");
         Err(self.error(&format!("{key}.max_m"), problem, "swap the components so that min_m <= max_m"))

@@ -1,4 +1,4 @@
-//! The scene file as text with positions, so that an error found long after parsing still names its line.
+//! A scene or case file as text with positions, so that an error found long after parsing still names its line.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use toml::de::{DeTable, DeValue};
 
 use crate::error::ConfigError;
 
-/// A scene file's text, its name, and where each key stands.
+/// Text of a file, its name, and where each key stands.
 #[derive(Debug)]
 pub struct Document {
     file: PathBuf,
@@ -21,10 +21,14 @@ pub struct Document {
 struct Entry {
     /// Dotted path; array elements as numbers.
     path: String,
+    /// Keys and array indices of the path.
+    steps: Vec<String>,
     /// Bytes of the key's name, or of the element.
     name: Range<usize>,
     /// Bytes of the value.
     value: Range<usize>,
+    /// The value, if it is a number.
+    number: Option<f64>,
 }
 
 impl Document {
@@ -32,7 +36,8 @@ impl Document {
     pub fn parse(file: &Path, text: &str) -> Result<Self, ConfigError> {
         let table = DeTable::parse(text).map_err(|e| syntax_error(file, text, &e))?;
         let mut entries = Vec::new();
-        list_table(table.get_ref(), "", &mut entries);
+        list_table(table.get_ref(), &[], &mut entries);
+        entries.sort_by_key(|entry| entry.value.start);
         Ok(Self { file: file.to_owned(), text: text.to_owned(), entries })
     }
 
@@ -53,6 +58,11 @@ impl Document {
                 advice: "`plicad schema` lists every key with its meaning, unit and range".into(),
             }
         })
+    }
+
+    /// Every number with its path (keys and array indices), in the order of the file.
+    pub(crate) fn numbers(&self) -> impl Iterator<Item = (&[String], f64)> {
+        self.entries.iter().filter_map(|entry| Some((entry.steps.as_slice(), entry.number?)))
     }
 
     /// An error about `key` (dotted path; array elements as numbers).
@@ -81,24 +91,38 @@ impl Document {
     }
 }
 
-fn list_table(table: &DeTable<'_>, parent: &str, entries: &mut Vec<Entry>) {
+fn list_table(table: &DeTable<'_>, parent: &[String], entries: &mut Vec<Entry>) {
     for (key, value) in table {
         list_value(key.get_ref(), key.span(), value, parent, entries);
     }
 }
 
-fn list_value(key: &str, name: Range<usize>, value: &Spanned<DeValue<'_>>, parent: &str, entries: &mut Vec<Entry>) {
-    let path = if parent.is_empty() { key.to_owned() } else { format!("{parent}.{key}") };
+fn list_value(
+    key: &str,
+    name: Range<usize>,
+    value: &Spanned<DeValue<'_>>,
+    parent: &[String],
+    entries: &mut Vec<Entry>,
+) {
+    let steps = [parent, &[key.to_owned()]].concat();
     match value.get_ref() {
-        DeValue::Table(table) => list_table(table, &path, entries),
+        DeValue::Table(table) => list_table(table, &steps, entries),
         DeValue::Array(items) => {
             for (i, item) in items.iter().enumerate() {
-                list_value(&i.to_string(), item.span(), item, &path, entries);
+                list_value(&i.to_string(), item.span(), item, &steps, entries);
             }
         }
         _ => {}
     }
-    entries.push(Entry { path, name, value: value.span() });
+    entries.push(Entry { path: steps.join("."), steps, name, value: value.span(), number: number(value.get_ref()) });
+}
+
+fn number(value: &DeValue<'_>) -> Option<f64> {
+    match value {
+        DeValue::Integer(n) => i128::from_str_radix(n.as_str(), n.radix()).ok().map(|n| n as f64),
+        DeValue::Float(x) => x.as_str().parse().ok(),
+        _ => None,
+    }
 }
 
 fn syntax_error(file: &Path, text: &str, e: &toml::de::Error) -> ConfigError {

@@ -7,6 +7,7 @@
 mod checks;
 mod document;
 mod error;
+mod ranges;
 
 pub mod case;
 pub mod hash;

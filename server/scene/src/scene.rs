@@ -12,8 +12,10 @@ mod tool;
 mod training;
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use plica_sim::{ContactOptions, Plane, SleepOptions, ToolDescription};
+use schemars::Schema;
 
 pub use accurate::AccurateConfig;
 pub use bench::{BenchConfig, Keyframe};
@@ -28,6 +30,7 @@ pub use training::{OutsideConfig, RecordedConfig, TrainingConfig};
 use crate::checks::Check;
 use crate::document::Document;
 use crate::error::ConfigError;
+use crate::ranges;
 
 /// The wedge that runs when no scene is named.
 pub const BUILT_IN_SCENE: &str = include_str!("../../../configs/scenes/wedge.toml");
@@ -48,9 +51,10 @@ pub struct Config {
     text: String,
 }
 
-/// JSON Schema of scene files.
-pub fn schema() -> schemars::Schema {
-    schemars::schema_for!(RawConfig)
+/// JSON Schema of scene files: every key with its meaning, unit and range.
+pub fn schema() -> &'static Schema {
+    static SCHEMA: OnceLock<Schema> = OnceLock::new();
+    SCHEMA.get_or_init(|| schemars::schema_for!(RawConfig))
 }
 
 impl Config {
@@ -75,6 +79,7 @@ impl Config {
     pub fn parse(file: &Path, text: &str) -> Result<Self, ConfigError> {
         let document = Document::parse(file, text)?;
         let raw: RawConfig = document.read()?;
+        ranges::check(&document, schema().as_value())?;
         let check = Check::new(&document);
         let object = object::check(&check, &raw.objects)?;
         let tools = tool::check(&check, &raw.tools)?;
@@ -84,8 +89,8 @@ impl Config {
             name: file.file_stem().map_or_else(|| "scene".into(), |s| s.to_string_lossy().into_owned()),
             file: file.to_owned(),
             object,
-            contact: runtime::check_contact(&check, &raw.contact)?,
-            runtime: runtime::check(&check, &raw.runtime)?,
+            contact: runtime::contact(&raw.contact),
+            runtime: runtime::runtime(&raw.runtime),
             enrichment: check_enrichment(&check, &raw, &training)?,
             training,
             files: files::list(file, &raw),
@@ -186,8 +191,8 @@ fn check_enrichment(
     raw: &RawConfig,
     training: &TrainingConfig,
 ) -> Result<EnrichmentConfig, ConfigError> {
-    let (name, object) = raw.objects.first_key_value().expect("the object was checked before");
-    enrichment::check(c, &format!("objects.{name}.enrichment"), &object.enrichment, training.stamp_axes)
+    let (_, object) = raw.objects.first_key_value().expect("the object was checked before");
+    enrichment::check(c, &object.enrichment, training.stamp_axes)
 }
 
 #[cfg(test)]

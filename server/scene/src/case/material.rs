@@ -8,8 +8,8 @@ use super::select;
 use crate::checks::Check;
 use crate::error::ConfigError;
 
-/// Range of stiffnesses \[Pa\].
-const STIFFNESS: [f64; 2] = [1e-3, 1e13];
+/// Range of `lambda_pa` over `mu_pa`: Poisson's ratios from -0.5 to 0.499999.
+const LAMBDA_OVER_MU: [f64; 2] = [-0.5, 5e5];
 
 /// Hexahedra of another material.
 #[derive(Debug, Clone)]
@@ -50,17 +50,16 @@ pub(super) fn check_regions(
 
 fn constants(c: &Check<'_>, key: &str, raw: &RawMaterial) -> Result<Material, ConfigError> {
     let model = model(raw.model);
-    let stiffness = |name: &str, value: f64| c.number(&format!("{key}.{name}"), value, STIFFNESS[0], STIFFNESS[1]);
     match (raw.young_modulus_pa, raw.poisson_ratio, raw.mu_pa, raw.lambda_pa) {
-        (Some(young), Some(poisson), None, None) => Ok(Material {
-            model,
-            young_modulus_pa: stiffness("young_modulus_pa", young)?,
-            poisson_ratio: c.number(&format!("{key}.poisson_ratio"), poisson, -0.99, 0.499_999)?,
-        }),
-        (None, None, Some(mu), Some(lambda)) => {
-            let mu_pa = stiffness("mu_pa", mu)?;
-            // Poisson's ratio from -0.5 on; up to 0.499999 as above.
-            let lambda_pa = c.number(&format!("{key}.lambda_pa"), lambda, -0.5 * mu_pa, 5e5 * mu_pa)?;
+        (Some(young), Some(poisson), None, None) => {
+            Ok(Material { model, young_modulus_pa: young, poisson_ratio: poisson })
+        }
+        (None, None, Some(mu_pa), Some(lambda_pa)) => {
+            let [least, most] = LAMBDA_OVER_MU.map(|ratio| ratio * mu_pa);
+            if !(least..=most).contains(&lambda_pa) {
+                let problem = format!("{lambda_pa} is outside the allowed range {least} to {most} for mu_pa = {mu_pa}");
+                return Err(c.error(&format!("{key}.lambda_pa"), problem, "lambda_pa / mu_pa is 2 nu / (1 - 2 nu)"));
+            }
             Ok(Material::from_lame(model, Lame { lambda_pa, mu_pa }))
         }
         _ => {

@@ -80,14 +80,13 @@ fn check_target(c: &Check<'_>, key: &str, p: &RawProbe, supports: &[RawSupport])
         let advice = format!("give exactly one of {}", allowed.join(", "));
         return Err(c.error(key, format!("{quantity} is asked for at {} places", given.len()), advice));
     }
-    let point = |name: &str, x: [f64; 3]| c.point(&format!("{key}.{name}"), x);
     match (p.quantity, p.at_m, p.nearest_to_m, &p.select, &p.support) {
-        (RawQuantity::Displacement, Some(x), ..) => point("at_m", x).map(Target::DisplacementAt),
-        (RawQuantity::Displacement, _, Some(x), ..) => point("nearest_to_m", x).map(Target::DisplacementNearest),
+        (RawQuantity::Displacement, Some(x), ..) => Ok(Target::DisplacementAt(x.into())),
+        (RawQuantity::Displacement, _, Some(x), ..) => Ok(Target::DisplacementNearest(x.into())),
         (RawQuantity::Displacement, .., Some(s), _) => {
             select::check(c, &format!("{key}.select"), s).map(Target::DisplacementOver)
         }
-        (RawQuantity::Stress, Some(x), ..) => point("at_m", x).map(Target::StressAt),
+        (RawQuantity::Stress, Some(x), ..) => Ok(Target::StressAt(x.into())),
         (.., Some(name)) => check_support(c, key, name, supports).map(Target::Force),
         _ => Ok(Target::Volume),
     }

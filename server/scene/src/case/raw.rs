@@ -2,65 +2,79 @@
 
 #![allow(rustdoc::broken_intra_doc_links, reason = "units in brackets, as in the scene file")]
 
+use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::scene::raw::{RawBox, RawFace};
+use crate::scene::raw::{LARGEST_M, RawBox, RawFace};
 
-/// One accurate solve: a mesh, its materials, what holds and loads it, and what to tell of the result.
-#[derive(Debug, Clone, Deserialize)]
+/// Largest stress \[Pa\] or force \[N\] of a load.
+const LARGEST_LOAD: f64 = 1e15;
+
+/// One accurate solve: a mesh with materials, supports, loads and probes.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(title = "Plica case")]
 pub struct RawCase {
     /// Shape, by generator or file.
     pub mesh: RawMesh,
     /// Material of everything that no region claims.
     pub material: RawMaterial,
-    /// Parts of another material; a later one wins.
+    /// Parts of another material; a later region wins.
     #[serde(default)]
     pub regions: Vec<RawRegion>,
-    /// What holds the body.
+    /// Supports of the body.
     #[serde(default)]
     pub supports: Vec<RawSupport>,
-    /// What loads it.
+    /// Loads on the body.
     #[serde(default)]
     pub loads: Vec<RawLoad>,
-    /// What to tell of the result.
+    /// Quantities to report.
     #[serde(default)]
     pub probes: Vec<RawProbe>,
-    /// How to solve.
+    /// Load stepping and Newton iteration.
     #[serde(default)]
     pub solve: RawSolve,
 }
 
 /// Shape of the body.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawMesh {
-    /// Which generator makes the shape.
+    /// Generator of the shape.
     pub generator: Option<RawGenerator>,
     /// Block: extents along x, y, z [m]; one corner is the origin.
+    #[schemars(inner(range(min = 1e-9, max = 1e3)))]
     pub size_m: Option<[f64; 3]>,
     /// Wedge: extent along x [m].
+    #[schemars(range(min = 1e-9, max = 1e3))]
     pub length_m: Option<f64>,
     /// Wedge: extent along y [m].
+    #[schemars(range(min = 1e-9, max = 1e3))]
     pub width_m: Option<f64>,
     /// Wedge: height at x = 0 [m].
+    #[schemars(range(min = 1e-9, max = 1e3))]
     pub thick_height_m: Option<f64>,
     /// Wedge: height at x = length [m].
+    #[schemars(range(min = 1e-9, max = 1e3))]
     pub thin_height_m: Option<f64>,
     /// Hexahedron: corners [m], counter-clockwise around the bottom seen from above, then around the top.
+    #[schemars(inner(inner(range(min = -LARGEST_M, max = LARGEST_M))))]
     pub corners_m: Option<[[f64; 3]; 8]>,
     /// Hexahedra along the three directions of a generated shape.
+    #[schemars(inner(range(min = 1, max = 10_000)))]
     pub divisions: Option<[u32; 3]>,
     /// Length of the last hexahedron over that of the first, along each direction.
+    #[schemars(inner(range(min = 1e-3, max = 1e3)))]
     pub grading: Option<[f64; 3]>,
     /// Mesh file of hexahedra (.vtu, .msh), relative to the case file.
     pub file: Option<String>,
     /// Metres per unit of the file.
+    #[schemars(range(min = 1e-9, max = 1e3))]
     pub metres_per_unit: Option<f64>,
 }
 
 /// Generators of shapes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RawGenerator {
     /// A box.
@@ -72,55 +86,63 @@ pub enum RawGenerator {
 }
 
 /// An isotropic material by two of its constants.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawMaterial {
-    /// Which law.
+    /// Material law.
     pub model: RawModel,
     /// Young's modulus [Pa], with `poisson_ratio`.
+    #[schemars(range(min = 1e-3, max = 1e13))]
     pub young_modulus_pa: Option<f64>,
     /// Poisson's ratio [-], with `young_modulus_pa`.
+    #[schemars(range(min = -0.99, max = 0.499_999))]
     pub poisson_ratio: Option<f64>,
     /// Shear modulus [Pa], with `lambda_pa`.
+    #[schemars(range(min = 1e-3, max = 1e13))]
     pub mu_pa: Option<f64>,
     /// Lamé's first parameter [Pa], with `mu_pa`.
+    #[schemars(range(min = -5e12, max = 5e18))]
     pub lambda_pa: Option<f64>,
 }
 
 /// Material laws.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RawModel {
     /// Small strain, small rotation.
     Linear,
-    /// With the logarithm of the volume ratio.
+    /// Energy with the logarithm of the volume ratio.
     CompressibleNeoHookean,
-    /// Finite however it is squeezed.
+    /// Finite energy under any compression.
     StableNeoHookean,
 }
 
 /// A part of another material.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawRegion {
     /// Name, for messages.
     pub name: String,
     /// Hexahedra of the region.
     pub select: RawSelect,
-    /// Which law; that of `material` where left out.
+    /// Material law; that of `material` where left out.
     pub model: Option<RawModel>,
     /// Young's modulus [Pa], with `poisson_ratio`.
+    #[schemars(range(min = 1e-3, max = 1e13))]
     pub young_modulus_pa: Option<f64>,
     /// Poisson's ratio [-], with `young_modulus_pa`.
+    #[schemars(range(min = -0.99, max = 0.499_999))]
     pub poisson_ratio: Option<f64>,
     /// Shear modulus [Pa], with `lambda_pa`.
+    #[schemars(range(min = 1e-3, max = 1e13))]
     pub mu_pa: Option<f64>,
     /// Lamé's first parameter [Pa], with `mu_pa`.
+    #[schemars(range(min = -5e12, max = 5e18))]
     pub lambda_pa: Option<f64>,
 }
 
 /// A part of the mesh; all given conditions must hold.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawSelect {
     /// A box.
@@ -136,7 +158,7 @@ pub struct RawSelect {
 }
 
 /// Coordinate axes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RawAxis {
     /// Along x.
@@ -148,7 +170,7 @@ pub enum RawAxis {
 }
 
 /// Nodes whose displacement is given.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawSupport {
     /// Name, for messages and force probes.
@@ -158,7 +180,8 @@ pub struct RawSupport {
     /// Directions in which the nodes are held.
     #[serde(default = "all_axes")]
     pub axes: Vec<RawAxis>,
-    /// Where they are moved to [m]; 0 where left out.
+    /// Displacement of the nodes [m]; 0 where left out.
+    #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
     pub displacement_m: Option<[f64; 3]>,
 }
 
@@ -166,33 +189,38 @@ fn all_axes() -> Vec<RawAxis> {
     vec![RawAxis::X, RawAxis::Y, RawAxis::Z]
 }
 
-/// A load on boundary faces; exactly one of the three numbers.
-#[derive(Debug, Clone, Deserialize)]
+/// A load on boundary faces, by exactly one of `traction_pa`, `pressure_pa`, `force_n`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawLoad {
     /// Name, for messages.
     pub name: String,
     /// Boundary faces; with `force_n` also nodes.
     pub select: RawSelect,
-    /// Dead: force per rest area [Pa], keeps its direction.
+    /// Dead load: force per rest area [Pa].
+    #[schemars(inner(range(min = -LARGEST_LOAD, max = LARGEST_LOAD)))]
     pub traction_pa: Option<[f64; 3]>,
-    /// Follower: pushes against the deformed faces [Pa].
+    /// Follower load: pressure on the deformed faces [Pa].
+    #[schemars(range(min = -LARGEST_LOAD, max = LARGEST_LOAD))]
     pub pressure_pa: Option<f64>,
-    /// Dead: total force [N], spread evenly over the faces, or over the nodes where no face is selected.
+    /// Dead load: total force [N], spread evenly over the faces, or over the nodes where no face is selected.
+    #[schemars(inner(range(min = -LARGEST_LOAD, max = LARGEST_LOAD)))]
     pub force_n: Option<[f64; 3]>,
 }
 
-/// What to tell of the result.
-#[derive(Debug, Clone, Deserialize)]
+/// Quantities to report.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawProbe {
-    /// Its name in the output.
+    /// Name in the output.
     pub name: String,
-    /// What it tells.
+    /// Quantity that the probe reports.
     pub quantity: RawQuantity,
-    /// Displacement, stress: at this point of the body at rest [m].
+    /// Displacement, stress: point of the body at rest [m].
+    #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
     pub at_m: Option<[f64; 3]>,
-    /// Displacement: of the node nearest to this point [m].
+    /// Displacement: point whose nearest node is read [m].
+    #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
     pub nearest_to_m: Option<[f64; 3]>,
     /// Displacement: mean over these nodes.
     pub select: Option<RawSelect>,
@@ -200,8 +228,8 @@ pub struct RawProbe {
     pub support: Option<String>,
 }
 
-/// What a probe tells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+/// Quantities of probes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RawQuantity {
     /// [m], three components.
@@ -214,17 +242,21 @@ pub enum RawQuantity {
     Stress,
 }
 
-/// How to solve.
-#[derive(Debug, Clone, Deserialize)]
+/// Load stepping and Newton iteration.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawSolve {
-    /// Equal parts in which loads and displacements are applied, 1 to 1000.
+    /// Equal parts in which loads and displacements are applied.
+    #[schemars(range(min = 1, max = 1000))]
     pub steps: u32,
-    /// Largest force left, as a share of the largest nodal force, 1e-13 to 1e-3.
+    /// Largest force left, as a share of the largest nodal force.
+    #[schemars(range(min = 1e-13, max = 1e-3))]
     pub tolerance: f64,
-    /// Newton steps per part, 1 to 1000.
+    /// Newton steps per part.
+    #[schemars(range(min = 1, max = 1000))]
     pub max_iterations: u32,
-    /// How often in a row a part that fails is halved, 0 to 20.
+    /// Most successive halvings of a part that fails.
+    #[schemars(range(min = 0, max = 20))]
     pub max_halvings: u32,
 }
 

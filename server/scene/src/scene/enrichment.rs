@@ -28,11 +28,9 @@ pub struct EnrichmentConfig {
 /// `axes` are those that stamps are laid out along.
 pub(super) fn check(
     c: &Check<'_>,
-    key: &str,
     raw: &RawEnrichment,
     axes: [Vector3<f64>; 2],
 ) -> Result<EnrichmentConfig, ConfigError> {
-    let at = |name: &str| format!("{key}.{name}");
     let default = EnrichmentOptions::default();
     let correlator = correlator(raw.method);
     let interpolator = interpolator(raw.interpolation);
@@ -43,13 +41,13 @@ pub(super) fn check(
             correlator,
             field: FieldOptions {
                 interpolator,
-                texels: c.count(&at("texels"), raw.texels, 8, 256)? as usize,
+                texels: raw.texels as usize,
                 window: if is_wide { WIDE_WINDOW } else { default.field.window },
-                modes: c.count(&at("modes"), raw.modes, 1, 100_000)? as usize,
+                modes: raw.modes as usize,
                 control_variate: matches!(correlator, Correlator::Kriging | Correlator::Rescale),
                 ..default.field
             },
-            radius_cells: c.number(&at("radius_cells"), raw.radius_cells, 0.5, 64.0)?,
+            radius_cells: raw.radius_cells,
             coordinates: match raw.coordinates {
                 RawCoordinates::Exponential => Coordinates::Exponential,
                 RawCoordinates::Orthogonal => Coordinates::Orthogonal,

@@ -21,12 +21,12 @@ pub struct Region {
     pub accurate: AccurateMaterial,
 }
 
-pub(super) fn check(c: &Check<'_>, key: &str, raw: &RawMaterial) -> Result<Material, ConfigError> {
-    Ok(Material {
-        young_modulus_pa: young_modulus(c, key, raw.young_modulus_pa)?,
-        poisson_ratio: poisson_ratio(c, key, raw.poisson_ratio)?,
-        density_kg_per_m3: density(c, key, raw.density_kg_per_m3)?,
-    })
+pub(super) fn coarse(raw: &RawMaterial) -> Material {
+    Material {
+        young_modulus_pa: raw.young_modulus_pa,
+        poisson_ratio: raw.poisson_ratio,
+        density_kg_per_m3: raw.density_kg_per_m3,
+    }
 }
 
 /// Regions in the order of the file. Constants that a region leaves out are those of the model around it.
@@ -39,35 +39,20 @@ pub(super) fn check_regions(
 ) -> Result<Vec<Region>, ConfigError> {
     let region = |(i, r): (usize, &RawRegion)| {
         let key = format!("{key}.{i}");
-        let young = r.young_modulus_pa.map(|value| young_modulus(c, &key, value)).transpose()?;
-        let ratio = r.poisson_ratio.map(|value| poisson_ratio(c, &key, value)).transpose()?;
-        let density = r.density_kg_per_m3.map(|value| density(c, &key, value)).transpose()?;
         Ok(Region {
             name: r.name.clone(),
             corners: c.corners(&key, r.min_m, r.max_m)?,
             coarse: Material {
-                young_modulus_pa: young.unwrap_or(coarse.young_modulus_pa),
-                poisson_ratio: ratio.unwrap_or(coarse.poisson_ratio),
-                density_kg_per_m3: density.unwrap_or(coarse.density_kg_per_m3),
+                young_modulus_pa: r.young_modulus_pa.unwrap_or(coarse.young_modulus_pa),
+                poisson_ratio: r.poisson_ratio.unwrap_or(coarse.poisson_ratio),
+                density_kg_per_m3: r.density_kg_per_m3.unwrap_or(coarse.density_kg_per_m3),
             },
             accurate: AccurateMaterial {
                 model: accurate.model,
-                young_modulus_pa: young.unwrap_or(accurate.young_modulus_pa),
-                poisson_ratio: ratio.unwrap_or(accurate.poisson_ratio),
+                young_modulus_pa: r.young_modulus_pa.unwrap_or(accurate.young_modulus_pa),
+                poisson_ratio: r.poisson_ratio.unwrap_or(accurate.poisson_ratio),
             },
         })
     };
     raw.iter().enumerate().map(region).collect()
-}
-
-fn young_modulus(c: &Check<'_>, key: &str, value: f64) -> Result<f64, ConfigError> {
-    c.number(&format!("{key}.young_modulus_pa"), value, 10.0, 1e9)
-}
-
-fn poisson_ratio(c: &Check<'_>, key: &str, value: f64) -> Result<f64, ConfigError> {
-    c.number(&format!("{key}.poisson_ratio"), value, 0.0, 0.499)
-}
-
-fn density(c: &Check<'_>, key: &str, value: f64) -> Result<f64, ConfigError> {
-    c.number(&format!("{key}.density_kg_per_m3"), value, 1.0, 2e4)
 }

@@ -11,8 +11,8 @@ use plica_sim::{ElementKind, Material, Plane, Preconditioner, SolverOptions};
 use super::accurate::{self, AccurateConfig};
 use super::material::{self, Region};
 use super::raw::{
-    RawCoarse, RawElement, RawEmbedding, RawFace, RawFormat, RawGenerator, RawMesh, RawObject, RawPlane,
-    RawPreconditioner, RawPublish, RawSkin, RawSupports,
+    RawElement, RawEmbedding, RawFace, RawFormat, RawGenerator, RawMesh, RawObject, RawPlane, RawPreconditioner,
+    RawPublish, RawSkin, RawSolver, RawSupports,
 };
 use crate::checks::Check;
 use crate::error::ConfigError;
@@ -179,17 +179,16 @@ pub(super) fn check(c: &Check<'_>, objects: &BTreeMap<String, RawObject>) -> Res
     let raw = &objects[name];
     let mesh = check_mesh(c, &format!("{key}.mesh"), &raw.mesh)?;
     let divisions = check_divisions(c, &format!("{key}.coarse.divisions"), raw.coarse.divisions)?;
-    let material = material::check(c, &format!("{key}.material"), &raw.material)?;
+    let material = material::coarse(&raw.material);
     let (fixed, planes) = check_supports(c, &format!("{key}.supports"), &raw.supports)?;
     let accurate = accurate::check(c, &format!("{key}.accurate"), &raw.accurate, divisions, material)?;
-    let damping_key = format!("{key}.material.mass_damping_per_s");
     Ok(ObjectConfig {
         name: name.to_owned(),
         skin: check_skin(c, &format!("{key}.skin"), &raw.skin, &mesh)?,
         mesh,
         divisions,
         material,
-        mass_damping_per_s: c.number(&damping_key, raw.material.mass_damping_per_s, 0.0, 1e3)?,
+        mass_damping_per_s: raw.material.mass_damping_per_s,
         regions: material::check_regions(c, &format!("{key}.regions"), &raw.regions, material, accurate.material)?,
         fixed,
         planes,
@@ -197,20 +196,16 @@ pub(super) fn check(c: &Check<'_>, objects: &BTreeMap<String, RawObject>) -> Res
             RawElement::EnhancedStrain => ElementKind::EnhancedStrain,
             RawElement::FullIntegration => ElementKind::FullIntegration,
         },
-        substeps: c.count(&format!("{key}.coarse.substeps"), raw.coarse.substeps, 1, 16)?,
-        solver: check_solver(c, &format!("{key}.coarse.solver"), &raw.coarse)?,
-        publish: check_publish(c, &format!("{key}.publish"), &raw.publish)?,
-        tie: accurate::check_tie(c, &format!("{key}.tie"), &raw.tie, accurate.material.young_modulus_pa)?,
+        substeps: raw.coarse.substeps,
+        solver: solver(&raw.coarse.solver),
+        publish: publish(&raw.publish),
+        tie: accurate::tie(&raw.tie, accurate.material.young_modulus_pa),
         accurate,
     })
 }
 
 fn check_mesh(c: &Check<'_>, key: &str, raw: &RawMesh) -> Result<MeshConfig, ConfigError> {
-    let length = |name: &str, value: Option<f64>| {
-        let key = format!("{key}.{name}");
-        let value = c.required(&key, value, "generator = \"wedge\"")?;
-        c.number(&key, value, 1e-3, 10.0)
-    };
+    let length = |name: &str, value: Option<f64>| c.required(&format!("{key}.{name}"), value, "generator = \"wedge\"");
     match raw.generator {
         RawGenerator::Wedge => {
             c.absent(&format!("{key}.size_m"), &raw.size_m, "generator = \"wedge\"")?;
@@ -228,19 +223,12 @@ fn check_mesh(c: &Check<'_>, key: &str, raw: &RawMesh) -> Result<MeshConfig, Con
                 c.absent(&format!("{key}.{name}"), &value, "generator = \"block\"")?;
             }
             let key = format!("{key}.size_m");
-            let size = c.required(&key, raw.size_m, "generator = \"block\"")?;
-            for extent in size {
-                c.number(&key, extent, 1e-3, 10.0)?;
-            }
-            Ok(MeshConfig::Block(size))
+            Ok(MeshConfig::Block(c.required(&key, raw.size_m, "generator = \"block\"")?))
         }
     }
 }
 
 fn check_divisions(c: &Check<'_>, key: &str, raw: [u32; 3]) -> Result<[usize; 3], ConfigError> {
-    for n in raw {
-        c.count(key, n, 1, 200)?;
-    }
     let n_hexes: u64 = raw.iter().map(|n| u64::from(*n)).product();
     if n_hexes > MAX_HEXES {
         let problem = format!("{n_hexes} hexahedra; the allowed range is 1 to {MAX_HEXES}");
@@ -258,12 +246,12 @@ fn check_supports(c: &Check<'_>, key: &str, raw: &RawSupports) -> Result<(FixedC
     };
     let plane = |(i, p): (usize, &RawPlane)| {
         let key = format!("{key}.planes.{i}");
-        let normal: Vector3<f64> = c.vector(&format!("{key}.normal"), p.normal)?;
+        let normal: Vector3<f64> = p.normal.into();
         if normal.norm() < 1e-6 {
             let problem = format!("{:?} has no direction; its length must be 1e-6 or more", p.normal);
             return Err(c.error(&format!("{key}.normal"), problem, "a floor has normal = [0, 0, 1]"));
         }
-        Ok(Plane { point_m: c.point(&format!("{key}.point_m"), p.point_m)?, normal })
+        Ok(Plane { point_m: p.point_m.into(), normal })
     };
     Ok((fixed, raw.planes.iter().enumerate().map(plane).collect::<Result<_, _>>()?))
 }
@@ -280,23 +268,22 @@ fn face(raw: RawFace) -> Face {
     Face { axis, upper }
 }
 
-fn check_solver(c: &Check<'_>, key: &str, raw: &RawCoarse) -> Result<SolverOptions, ConfigError> {
-    let raw = &raw.solver;
-    Ok(SolverOptions {
+fn solver(raw: &RawSolver) -> SolverOptions {
+    SolverOptions {
         preconditioner: match raw.preconditioner {
             RawPreconditioner::Auto => Preconditioner::Auto,
             RawPreconditioner::BlockTridiagonal => Preconditioner::BlockTridiagonal,
             RawPreconditioner::BlockJacobi => Preconditioner::BlockJacobi,
         },
-        tolerance: c.number(&format!("{key}.tolerance"), raw.tolerance, 1e-7, 0.1)?,
-        max_iterations: c.count(&format!("{key}.max_iterations"), raw.max_iterations, 1, 200)?,
-        fallback_iterations: c.count(&format!("{key}.fallback_iterations"), raw.fallback_iterations, 1, 500)?,
-    })
+        tolerance: raw.tolerance,
+        max_iterations: raw.max_iterations,
+        fallback_iterations: raw.fallback_iterations,
+    }
 }
 
 fn check_skin(c: &Check<'_>, key: &str, raw: &RawSkin, mesh: &MeshConfig) -> Result<SkinConfig, ConfigError> {
     let spacing_key = format!("{key}.spacing_m");
-    let spacing_m = c.number(&spacing_key, raw.spacing_m, 1e-4, 1.0)?;
+    let spacing_m = raw.spacing_m;
     let [x, y, z] = mesh.extents_m();
     let estimate = 2.0 * (x * y + y * z + z * x) / (spacing_m * spacing_m);
     if estimate > MAX_SKIN {
@@ -304,7 +291,7 @@ fn check_skin(c: &Check<'_>, key: &str, raw: &RawSkin, mesh: &MeshConfig) -> Res
         let problem = format!("{spacing_m} makes about {estimate:.0} vertices; at most {MAX_SKIN} are allowed");
         return Err(c.error(&spacing_key, problem, format!("choose {least:.1e} or more for this object")));
     }
-    let support_cells = c.number(&format!("{key}.support_cells"), raw.support_cells, 1.0, 3.0)?;
+    let support_cells = raw.support_cells;
     let embedding = match raw.embedding {
         RawEmbedding::MovingLeastSquares => EmbeddingKind::MovingLeastSquares { support_cells },
         RawEmbedding::Trilinear => EmbeddingKind::Trilinear,
@@ -312,16 +299,16 @@ fn check_skin(c: &Check<'_>, key: &str, raw: &RawSkin, mesh: &MeshConfig) -> Res
     Ok(SkinConfig { spacing_m, embedding })
 }
 
-fn check_publish(c: &Check<'_>, key: &str, raw: &RawPublish) -> Result<PublishConfig, ConfigError> {
-    Ok(PublishConfig {
-        publish_hz: c.number(&format!("{key}.publish_hz"), raw.publish_hz, 1.0, 1000.0)?,
+fn publish(raw: &RawPublish) -> PublishConfig {
+    PublishConfig {
+        publish_hz: raw.publish_hz,
         normals: raw.normals,
         format: match raw.format {
             RawFormat::F32 => PositionFormat::F32,
             RawFormat::I16 => PositionFormat::I16,
         },
-        wrench_hz: c.number(&format!("{key}.wrench_hz"), raw.wrench_hz, 1.0, 1000.0)?,
-    })
+        wrench_hz: raw.wrench_hz,
+    }
 }
 
 impl MeshConfig {

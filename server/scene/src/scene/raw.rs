@@ -13,6 +13,9 @@ use serde::Deserialize;
 pub(crate) use enrichment::*;
 pub(crate) use training::*;
 
+/// Largest coordinate of a point in a scene or case \[m\].
+pub(crate) const LARGEST_M: f64 = 1e3;
+
 /// A scene: one soft object, the tools that touch it, and how it runs.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -29,7 +32,7 @@ pub struct RawConfig {
     /// Time step, gravity, real-time thread.
     #[serde(default)]
     pub runtime: RawRuntime,
-    /// What `plicad bench` does with the tools.
+    /// Scripted tool motion of `plicad bench`.
     pub bench: Option<RawBench>,
 }
 
@@ -44,7 +47,7 @@ pub struct RawObject {
     /// Boxes of another material; a later region wins.
     #[serde(default)]
     pub regions: Vec<RawRegion>,
-    /// What holds the object.
+    /// Supports of the object.
     #[serde(default)]
     pub supports: RawSupports,
     /// Real-time model.
@@ -53,7 +56,7 @@ pub struct RawObject {
     /// Published surface.
     #[serde(default)]
     pub skin: RawSkin,
-    /// What is sent, and how often.
+    /// Contents and rates of the published data.
     #[serde(default)]
     pub publish: RawPublish,
     /// Quasi-static model that examples are made with.
@@ -62,7 +65,7 @@ pub struct RawObject {
     /// How the accurate skin is tied to the coarse imprint.
     #[serde(default)]
     pub tie: RawTie,
-    /// What `plicad train` does.
+    /// Interactions and sampling of `plicad train`.
     #[serde(default)]
     pub training: RawTraining,
     /// How examples become detail on the skin.
@@ -74,17 +77,22 @@ pub struct RawObject {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawMesh {
-    /// Which generator makes the shape.
+    /// Generator of the shape.
     pub generator: RawGenerator,
     /// Wedge: extent along x [m].
+    #[schemars(range(min = 1e-3, max = 10.0))]
     pub length_m: Option<f64>,
     /// Wedge: extent along y [m].
+    #[schemars(range(min = 1e-3, max = 10.0))]
     pub width_m: Option<f64>,
     /// Wedge: height at x = 0 [m].
+    #[schemars(range(min = 1e-3, max = 10.0))]
     pub thick_height_m: Option<f64>,
     /// Wedge: height at x = length [m].
+    #[schemars(range(min = 1e-3, max = 10.0))]
     pub thin_height_m: Option<f64>,
     /// Block: extents along x, y, z [m].
+    #[schemars(inner(range(min = 1e-3, max = 10.0)))]
     pub size_m: Option<[f64; 3]>,
 }
 
@@ -102,14 +110,18 @@ pub enum RawGenerator {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawMaterial {
-    /// Young's modulus [Pa], 10 to 1e9.
+    /// Young's modulus [Pa].
+    #[schemars(range(min = 10.0, max = 1e9))]
     pub young_modulus_pa: f64,
-    /// Poisson's ratio [-], 0 to 0.499.
+    /// Poisson's ratio [-].
+    #[schemars(range(min = 0.0, max = 0.499))]
     pub poisson_ratio: f64,
-    /// Density [kg/m3], 1 to 2e4.
+    /// Density [kg/m3].
+    #[schemars(range(min = 1.0, max = 2e4))]
     pub density_kg_per_m3: f64,
-    /// Damping proportional to mass [1/s], 0 to 1000.
+    /// Damping proportional to mass [1/s].
     #[serde(default = "defaults::one")]
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub mass_damping_per_s: f64,
 }
 
@@ -120,18 +132,23 @@ pub struct RawRegion {
     /// Name, for messages.
     pub name: String,
     /// Lower corner [m].
+    #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
     pub min_m: [f64; 3],
     /// Upper corner [m].
+    #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
     pub max_m: [f64; 3],
     /// Young's modulus [Pa]; the object's where left out.
+    #[schemars(range(min = 10.0, max = 1e9))]
     pub young_modulus_pa: Option<f64>,
     /// Poisson's ratio [-]; the object's where left out.
+    #[schemars(range(min = 0.0, max = 0.499))]
     pub poisson_ratio: Option<f64>,
     /// Density [kg/m3]; the object's where left out.
+    #[schemars(range(min = 1.0, max = 2e4))]
     pub density_kg_per_m3: Option<f64>,
 }
 
-/// What holds the object.
+/// Supports of the object.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawSupports {
@@ -141,7 +158,7 @@ pub struct RawSupports {
     pub planes: Vec<RawPlane>,
 }
 
-/// Which coarse nodes are held.
+/// Coarse nodes that never move.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawFixed {
@@ -178,8 +195,10 @@ pub struct RawFile(pub String);
 #[serde(deny_unknown_fields)]
 pub struct RawBox {
     /// Lower corner [m].
+    #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
     pub min_m: [f64; 3],
     /// Upper corner [m].
+    #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
     pub max_m: [f64; 3],
 }
 
@@ -188,8 +207,10 @@ pub struct RawBox {
 #[serde(deny_unknown_fields)]
 pub struct RawPlane {
     /// A point of its surface [m].
+    #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
     pub point_m: [f64; 3],
     /// Direction towards the object; need not be of unit length.
+    #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
     pub normal: [f64; 3],
 }
 
@@ -198,10 +219,12 @@ pub struct RawPlane {
 #[serde(deny_unknown_fields, default)]
 pub struct RawCoarse {
     /// Hexahedra along x, y, z.
+    #[schemars(inner(range(min = 1, max = 200)))]
     pub divisions: [u32; 3],
     /// Hexahedron whose stiffness is precomputed.
     pub element: RawElement,
-    /// Implicit steps per tick, 1 to 16.
+    /// Implicit steps per tick.
+    #[schemars(range(min = 1, max = 16))]
     pub substeps: u32,
     /// Linear solver.
     pub solver: RawSolver,
@@ -223,11 +246,14 @@ pub enum RawElement {
 pub struct RawSolver {
     /// Preconditioner of the conjugate gradients.
     pub preconditioner: RawPreconditioner,
-    /// Exit when the residual has fallen to this share, 1e-7 to 0.1.
+    /// Residual at which the iteration stops, as a share of the first one [-].
+    #[schemars(range(min = 1e-7, max = 0.1))]
     pub tolerance: f64,
-    /// Iterations before the solve is restored and repeated with block Jacobi, 1 to 200.
+    /// Most iterations before the solve is repeated with block Jacobi.
+    #[schemars(range(min = 1, max = 200))]
     pub max_iterations: u32,
-    /// Iterations of that repetition, 1 to 500.
+    /// Most iterations of the repetition with block Jacobi.
+    #[schemars(range(min = 1, max = 500))]
     pub fallback_iterations: u32,
 }
 
@@ -248,10 +274,12 @@ pub enum RawPreconditioner {
 #[serde(deny_unknown_fields, default)]
 pub struct RawSkin {
     /// Largest edge of the skin grid [m].
+    #[schemars(range(min = 1e-4, max = 1.0))]
     pub spacing_m: f64,
     /// Interpolation from coarse nodes to skin vertices.
     pub embedding: RawEmbedding,
-    /// Radius of moving least squares in coarse cells, 1 to 3.
+    /// Radius of moving least squares in coarse cells.
+    #[schemars(range(min = 1.0, max = 3.0))]
     pub support_cells: f64,
 }
 
@@ -265,17 +293,19 @@ pub enum RawEmbedding {
     Trilinear,
 }
 
-/// What is sent, and how often.
+/// Contents and rates of the published data.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawPublish {
-    /// Skin frames per second while somebody listens, 1 to 1000.
+    /// Skin frames per second while somebody listens.
+    #[schemars(range(min = 1.0, max = 1e3))]
     pub publish_hz: f64,
     /// Whether vertex normals follow the positions.
     pub normals: bool,
     /// How positions are written.
     pub format: RawFormat,
-    /// Wrenches per second and tool, 1 to 1000.
+    /// Wrenches per second and tool.
+    #[schemars(range(min = 1.0, max = 1e3))]
     pub wrench_hz: f64,
 }
 
@@ -298,40 +328,51 @@ pub struct RawTool {
     /// How the simulated proxy follows the device.
     #[serde(default = "defaults::spring")]
     pub coupling: RawCoupling,
-    /// Spring of the coupling [N/m], 1 to 1e5.
+    /// Spring of the coupling [N/m].
+    #[schemars(range(min = 1.0, max = 1e5))]
     pub coupling_stiffness_n_per_m: Option<f64>,
-    /// Damper of the coupling [N s/m], 0 to 1000; critical for the proxy's mass where left out.
+    /// Damper of the coupling [N s/m]; critical for the proxy's mass where left out.
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub coupling_damping_n_s_per_m: Option<f64>,
-    /// Mass of the proxy [kg], 1e-4 to 1.
+    /// Mass of the proxy [kg].
+    #[schemars(range(min = 1e-4, max = 1.0))]
     pub proxy_mass_kg: Option<f64>,
-    /// Lever that turns the coupling's translational numbers into rotational ones [m], 1e-3 to 1.
+    /// Lever of the rotational coupling [m]: rotational stiffness is stiffness times lever squared.
+    #[schemars(range(min = 1e-3, max = 1.0))]
     pub coupling_lever_m: Option<f64>,
-    /// Largest force the coupling transmits [N], 0.01 to 1000.
+    /// Largest force the coupling transmits [N].
+    #[schemars(range(min = 0.01, max = 1e3))]
     pub max_force_n: Option<f64>,
-    /// Largest torque the coupling transmits [N m], 1e-4 to 100.
+    /// Largest torque the coupling transmits [N m].
+    #[schemars(range(min = 1e-4, max = 100.0))]
     pub max_torque_n_m: Option<f64>,
     /// How device poses become one pose per tick.
     #[serde(default = "defaults::latest")]
     pub sampling: RawSampling,
-    /// Interpolation: delay behind the newest sample [ms], 0 to 500.
+    /// Interpolation: delay behind the newest sample [ms].
+    #[schemars(range(min = 0.0, max = 500.0))]
     pub delay_ms: Option<f64>,
-    /// Fastest motion followed; a faster jump re-places the tool [m/s], 0.01 to 100.
+    /// Fastest motion followed [m/s]; a faster jump re-places the tool without sweep.
     #[serde(default = "defaults::tool_speed")]
+    #[schemars(range(min = 0.01, max = 100.0))]
     pub max_tool_speed_m_per_s: f64,
-    /// Coulomb friction against the skin [-], 0 to 2.
+    /// Coulomb friction against the skin [-].
     #[serde(default = "defaults::friction")]
+    #[schemars(range(min = 0.0, max = 2.0))]
     pub friction: f64,
-    /// Without a new pose for this long the tool is held and flagged [ms], 1 to 60000.
+    /// Age of the newest pose at which the tool is held and flagged as stale [ms].
     #[serde(default = "defaults::stale_ms")]
+    #[schemars(range(min = 1.0, max = 6e4))]
     pub stale_after_ms: f64,
-    /// Where the tracker stands in the world.
+    /// Pose of the tracker in the world.
     #[serde(default)]
     pub world_from_tracker: RawTransform,
-    /// Where the tracked marker sits on the tool.
+    /// Pose of the tracked marker on the tool.
     #[serde(default)]
     pub tool_from_marker: RawTransform,
-    /// Factor on tracked positions before `world_from_tracker` [-], 1e-4 to 1e4.
+    /// Factor on tracked positions before `world_from_tracker` [-].
     #[serde(default = "defaults::one")]
+    #[schemars(range(min = 1e-4, max = 1e4))]
     pub position_scale: f64,
 }
 
@@ -341,24 +382,29 @@ pub struct RawTool {
 pub enum RawShape {
     /// Ball around the origin.
     Ball {
-        /// Radius [m], 5e-4 to 0.5.
+        /// Radius [m].
+        #[schemars(range(min = 5e-4, max = 0.5))]
         radius_m: f64,
     },
     /// Rod with round ends, from the origin along +z.
     Capsule {
-        /// Radius [m], 5e-4 to 0.5.
+        /// Radius [m].
+        #[schemars(range(min = 5e-4, max = 0.5))]
         radius_m: f64,
-        /// Distance between the centres of the two ends [m], 1e-4 to 2.
+        /// Distance between the centres of the two ends [m].
+        #[schemars(range(min = 1e-4, max = 2.0))]
         length_m: f64,
     },
     /// Box around the origin.
     Cuboid {
-        /// Extents along x, y, z [m], 1e-3 to 1 each.
+        /// Extents along x, y, z [m].
+        #[schemars(inner(range(min = 1e-3, max = 1.0)))]
         size_m: [f64; 3],
     },
     /// Convex hull of points.
     ConvexHull {
         /// Points [m], at least four that do not lie in a plane.
+        #[schemars(inner(inner(range(min = -LARGEST_M, max = LARGEST_M))))]
         points_m: Vec<[f64; 3]>,
     },
     /// Union of convex parts from an OBJ file: every group or object (`g`, `o`) is one part.
@@ -367,6 +413,7 @@ pub enum RawShape {
         file: RawFile,
         /// Metres per unit of the file.
         #[serde(default = "defaults::one")]
+        #[schemars(range(min = 1e-6, max = 1e3))]
         metres_per_unit: f64,
     },
 }
@@ -396,6 +443,7 @@ pub enum RawSampling {
 #[serde(deny_unknown_fields, default)]
 pub struct RawTransform {
     /// Translation [m].
+    #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
     pub translation_m: [f64; 3],
     /// Unit quaternion `x, y, z, w`.
     pub rotation_xyzw: [f64; 4],
@@ -405,19 +453,26 @@ pub struct RawTransform {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawContact {
-    /// Penalty over the effective stiffness of the touched skin point [-], 1 to 100.
+    /// Penalty over the effective stiffness of the touched skin point [-].
+    #[schemars(range(min = 1.0, max = 100.0))]
     pub stiffness_ratio: f64,
-    /// Share of the multiplier error corrected per tick, above 0 to 1.
+    /// Share of the multiplier error corrected per tick.
+    #[schemars(range(min = 1e-3, max = 1.0))]
     pub multiplier_relaxation: f64,
-    /// A skin point whose predicted gap is below this becomes a contact row [m], 0 to 0.01.
+    /// Predicted gap below which a skin point becomes a contact row [m].
+    #[schemars(range(min = 0.0, max = 0.01))]
     pub activation_gap_m: f64,
-    /// Time in which penetration found at a new contact is resolved [s], 1e-4 to 1.
+    /// Time in which penetration found at a new contact is resolved [s].
+    #[schemars(range(min = 1e-4, max = 1.0))]
     pub recovery_time_s: f64,
-    /// Most contact rows per tool, 1 to 256.
+    /// Most contact rows per tool.
+    #[schemars(range(min = 1, max = 256))]
     pub max_contacts: u32,
-    /// Most contact rows per plane of the supports, 1 to 1024.
+    /// Most contact rows per plane of the supports.
+    #[schemars(range(min = 1, max = 1024))]
     pub max_support_contacts: u32,
-    /// Coulomb friction of the planes [-], 0 to 2.
+    /// Coulomb friction of the planes [-].
+    #[schemars(range(min = 0.0, max = 2.0))]
     pub plane_friction: f64,
 }
 
@@ -425,13 +480,17 @@ pub struct RawContact {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawRuntime {
-    /// Length of a tick [s], 1e-4 to 0.02.
+    /// Length of a tick [s].
+    #[schemars(range(min = 1e-4, max = 0.02))]
     pub timestep_s: f64,
-    /// Free fall, downwards along -z [m/s2], 0 to 100.
+    /// Acceleration of free fall along -z [m/s2].
+    #[schemars(range(min = 0.0, max = 100.0))]
     pub gravity_m_per_s2: f64,
-    /// `SCHED_FIFO` priority asked for, 1 to 99; 0 does not ask.
+    /// `SCHED_FIFO` priority of the simulation thread; 0 keeps the ordinary scheduler.
+    #[schemars(range(min = 0, max = 99))]
     pub realtime_priority: u32,
     /// Core that the simulation thread is pinned to.
+    #[schemars(range(min = 0, max = 1023))]
     pub cpu: Option<u32>,
     /// Whether to lock memory, so that no tick waits for a page.
     pub lock_memory: bool,
@@ -443,33 +502,38 @@ pub struct RawRuntime {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawSleep {
-    /// Whether it ever does.
+    /// Whether an object at rest sleeps.
     pub enabled: bool,
-    /// Fastest node that counts as at rest [m/s], 1e-8 to 0.1.
+    /// Fastest node that counts as at rest [m/s].
+    #[schemars(range(min = 1e-8, max = 0.1))]
     pub speed_m_per_s: f64,
-    /// How long it must have been at rest with no tool near [s], 0 to 60.
+    /// Time at rest with no tool near before the object sleeps [s].
+    #[schemars(range(min = 0.0, max = 60.0))]
     pub after_s: f64,
 }
 
-/// What `plicad bench` does with the tools.
+/// Scripted tool motion of `plicad bench`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawBench {
     /// Keyframes per tool, in order of time; straight lines between them, held after the last.
     pub motion: Vec<RawKeyframe>,
-    /// When the tool's force is reported as the force at full press [s].
+    /// Time at which the tool's force is reported as the force at full press [s].
+    #[schemars(range(min = 0.0, max = 3600.0))]
     pub full_press_s: Option<f64>,
 }
 
-/// Where a tool is at one time.
+/// Pose of a tool at one time.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawKeyframe {
     /// Name of the tool.
     pub tool: String,
     /// Time [s].
+    #[schemars(range(min = 0.0, max = 3600.0))]
     pub time_s: f64,
     /// Position of the tool's origin [m].
+    #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
     pub position_m: [f64; 3],
     /// Unit quaternion `x, y, z, w`.
     #[serde(default = "defaults::upright")]

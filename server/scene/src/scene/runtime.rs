@@ -1,12 +1,9 @@
-//! `[runtime]` and `[contact]`, checked.
+//! `[runtime]` and `[contact]` in the simulation's types.
 
 use nalgebra::Vector3;
 use plica_sim::{ContactOptions, SleepOptions};
 
 use super::raw::{RawContact, RawRuntime};
-use crate::checks::Check;
-use crate::error::ConfigError;
-
 /// Time step, gravity, real-time thread.
 #[derive(Debug, Clone)]
 pub struct RuntimeConfig {
@@ -45,32 +42,29 @@ impl RuntimeConfig {
     }
 }
 
-pub(super) fn check(c: &Check<'_>, raw: &RawRuntime) -> Result<RuntimeConfig, ConfigError> {
-    let gravity = c.number("runtime.gravity_m_per_s2", raw.gravity_m_per_s2, 0.0, 100.0)?;
-    let priority = c.count("runtime.realtime_priority", raw.realtime_priority, 0, 99)?;
-    let cpu = raw.cpu.map(|cpu| c.count("runtime.cpu", cpu, 0, 1023)).transpose()?;
-    Ok(RuntimeConfig {
-        timestep_s: c.number("runtime.timestep_s", raw.timestep_s, 1e-4, 0.02)?,
-        gravity_m_per_s2: Vector3::new(0.0, 0.0, -gravity),
-        realtime_priority: (priority > 0).then_some(priority),
-        cpu: cpu.map(|cpu| cpu as usize),
+pub(super) fn runtime(raw: &RawRuntime) -> RuntimeConfig {
+    RuntimeConfig {
+        timestep_s: raw.timestep_s,
+        gravity_m_per_s2: Vector3::new(0.0, 0.0, -raw.gravity_m_per_s2),
+        realtime_priority: (raw.realtime_priority > 0).then_some(raw.realtime_priority),
+        cpu: raw.cpu.map(|cpu| cpu as usize),
         lock_memory: raw.lock_memory,
         sleep: SleepOptions {
             enabled: raw.sleep.enabled,
-            speed_m_per_s: c.number("runtime.sleep.speed_m_per_s", raw.sleep.speed_m_per_s, 1e-8, 0.1)?,
-            after_s: c.number("runtime.sleep.after_s", raw.sleep.after_s, 0.0, 60.0)?,
+            speed_m_per_s: raw.sleep.speed_m_per_s,
+            after_s: raw.sleep.after_s,
         },
-    })
+    }
 }
 
-pub(super) fn check_contact(c: &Check<'_>, raw: &RawContact) -> Result<ContactOptions, ConfigError> {
-    Ok(ContactOptions {
-        stiffness_ratio: c.number("contact.stiffness_ratio", raw.stiffness_ratio, 1.0, 100.0)?,
-        multiplier_relaxation: c.number("contact.multiplier_relaxation", raw.multiplier_relaxation, 1e-3, 1.0)?,
-        activation_gap_m: c.number("contact.activation_gap_m", raw.activation_gap_m, 0.0, 0.01)?,
-        recovery_time_s: c.number("contact.recovery_time_s", raw.recovery_time_s, 1e-4, 1.0)?,
-        max_contacts: c.count("contact.max_contacts", raw.max_contacts, 1, 256)? as usize,
-        max_support_contacts: c.count("contact.max_support_contacts", raw.max_support_contacts, 1, 1024)? as usize,
-        plane_friction: c.number("contact.plane_friction", raw.plane_friction, 0.0, 2.0)?,
-    })
+pub(super) fn contact(raw: &RawContact) -> ContactOptions {
+    ContactOptions {
+        stiffness_ratio: raw.stiffness_ratio,
+        multiplier_relaxation: raw.multiplier_relaxation,
+        activation_gap_m: raw.activation_gap_m,
+        recovery_time_s: raw.recovery_time_s,
+        max_contacts: raw.max_contacts as usize,
+        max_support_contacts: raw.max_support_contacts as usize,
+        plane_friction: raw.plane_friction,
+    }
 }

@@ -73,7 +73,11 @@ fn the_peer_wedge_reads() {
 #[test]
 fn every_bad_file_gives_one_clear_message() {
     let cases: &[(&str, &str, &[&str])] = &[
-        ("poisson_ratio = 0.45", "poisson_ratio = 0.7", &["material.poisson_ratio", "0.7", "0 to 0.499", "choose"]),
+        (
+            "poisson_ratio = 0.45",
+            "poisson_ratio = 0.7",
+            &["material.poisson_ratio", "0.7", "0 to 0.499", "Poisson's ratio [-]"],
+        ),
         ("young_modulus_pa = 3e4", "young_modulus_pa = nan", &["young_modulus_pa", "10 to 1000000000"]),
         ("young_modulus_pa = 3e4", "young_modulus_kpa = 30", &["unknown field `young_modulus_kpa`", "expected"]),
         ("young_modulus_pa = 3e4", "young_modulus_pa = \"stiff\"", &["young_modulus_pa", "invalid type", "string"]),
@@ -137,15 +141,10 @@ fn every_bad_file_gives_one_clear_message() {
             assert!(message.contains(fragment), "`{fragment}` is missing in: {message}");
         }
         let named: usize = message.split(':').nth(1).unwrap().parse().unwrap();
+        if message.contains("outside the allowed range") {
+            assert_eq!(named, line, "{message}");
+        }
         assert!((line.saturating_sub(20)..=line + 1).contains(&named), "line {line} expected: {message}");
-    }
-}
-
-#[test]
-fn the_line_of_a_range_error_is_exact() {
-    for (from, to) in [("poisson_ratio = 0.45", "poisson_ratio = 0.7"), ("timestep_s = 0.001", "timestep_s = 1.0")] {
-        let (message, line) = message_and_line(from, to);
-        assert!(message.starts_with(&format!("bad.toml:{line}: ")), "{line} expected: {message}");
     }
 }
 

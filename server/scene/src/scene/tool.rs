@@ -1,8 +1,9 @@
 //! The tools of a scene, checked.
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 
-use nalgebra::{Isometry3, Translation3};
+use nalgebra::{Isometry3, Point3, Translation3};
 use plica_geometry::import::read_obj_parts;
 use plica_sim::{Coupling, Sampling, SpringCoupling, ToolDescription, ToolShape};
 
@@ -12,6 +13,8 @@ use crate::error::ConfigError;
 
 /// Most tools of a scene.
 const MAX_TOOLS: usize = 16;
+/// Number of points of a convex hull.
+const HULL_POINTS: RangeInclusive<usize> = 4..=1000;
 
 /// All tools in alphabetical order.
 pub(super) fn check(c: &Check<'_>, tools: &BTreeMap<String, RawTool>) -> Result<Vec<ToolDescription>, ConfigError> {
@@ -29,51 +32,40 @@ fn check_tool(c: &Check<'_>, name: &str, raw: &RawTool) -> Result<ToolDescriptio
         name: name.to_owned(),
         shape: check_shape(c, &key("shape"), &raw.shape)?,
         coupling: check_coupling(c, &key, raw)?,
-        friction: c.number(&key("friction"), raw.friction, 0.0, 2.0)?,
+        friction: raw.friction,
         sampling: check_sampling(c, &key, raw)?,
-        max_tool_speed_m_per_s: c.number(&key("max_tool_speed_m_per_s"), raw.max_tool_speed_m_per_s, 0.01, 100.0)?,
-        stale_after_s: 1e-3 * c.number(&key("stale_after_ms"), raw.stale_after_ms, 1.0, 6e4)?,
+        max_tool_speed_m_per_s: raw.max_tool_speed_m_per_s,
+        stale_after_s: 1e-3 * raw.stale_after_ms,
         world_from_tracker: check_transform(c, &key("world_from_tracker"), &raw.world_from_tracker)?,
         tool_from_marker: check_transform(c, &key("tool_from_marker"), &raw.tool_from_marker)?,
-        position_scale: c.number(&key("position_scale"), raw.position_scale, 1e-4, 1e4)?,
+        position_scale: raw.position_scale,
     })
 }
 
 fn check_transform(c: &Check<'_>, key: &str, raw: &RawTransform) -> Result<Isometry3<f64>, ConfigError> {
-    let translation = c.vector(&format!("{key}.translation_m"), raw.translation_m)?;
+    let translation = Translation3::from(raw.translation_m);
     let rotation = c.rotation(&format!("{key}.rotation_xyzw"), raw.rotation_xyzw)?;
-    Ok(Isometry3::from_parts(Translation3::from(translation), rotation))
+    Ok(Isometry3::from_parts(translation, rotation))
 }
 
 fn check_shape(c: &Check<'_>, key: &str, raw: &RawShape) -> Result<ToolShape, ConfigError> {
-    let radius = |kind: &str, r: f64| c.number(&format!("{key}.{kind}.radius_m"), r, 5e-4, 0.5);
     match raw {
-        RawShape::Ball { radius_m } => Ok(ToolShape::Ball { radius_m: radius("ball", *radius_m)? }),
-        RawShape::Capsule { radius_m, length_m } => Ok(ToolShape::Capsule {
-            radius_m: radius("capsule", *radius_m)?,
-            length_m: c.number(&format!("{key}.capsule.length_m"), *length_m, 1e-4, 2.0)?,
-        }),
-        RawShape::Cuboid { size_m } => {
-            for extent in size_m {
-                c.number(&format!("{key}.cuboid.size_m"), *extent, 1e-3, 1.0)?;
-            }
-            Ok(ToolShape::Cuboid { half_extents_m: size_m.map(|extent| 0.5 * extent) })
-        }
+        RawShape::Ball { radius_m } => Ok(ToolShape::Ball { radius_m: *radius_m }),
+        RawShape::Capsule { radius_m, length_m } => Ok(ToolShape::Capsule { radius_m: *radius_m, length_m: *length_m }),
+        RawShape::Cuboid { size_m } => Ok(ToolShape::Cuboid { half_extents_m: size_m.map(|extent| 0.5 * extent) }),
         RawShape::ConvexHull { points_m } => {
             let key = format!("{key}.convex_hull.points_m");
-            if points_m.len() < 4 {
-                let problem = format!("{} points; at least 4 are needed, at most 1000 allowed", points_m.len());
-                return Err(c.error(&key, problem, "add points that do not lie in one plane"));
+            if !HULL_POINTS.contains(&points_m.len()) {
+                let [least, most] = [HULL_POINTS.start(), HULL_POINTS.end()];
+                let problem = format!("{} points; the allowed range is {least} to {most}", points_m.len());
+                return Err(c.error(&key, problem, "give the corners of a body, not all in one plane"));
             }
-            c.count(&key, points_m.len() as u32, 4, 1000)?;
-            let points = points_m.iter().map(|p| c.point(&key, *p));
-            Ok(ToolShape::ConvexHull { points_m: points.collect::<Result<_, _>>()? })
+            Ok(ToolShape::ConvexHull { points_m: points_m.iter().map(|point| Point3::from(*point)).collect() })
         }
         RawShape::Mesh { file, metres_per_unit } => {
             let key = format!("{key}.mesh");
-            let scale = c.number(&format!("{key}.metres_per_unit"), *metres_per_unit, 1e-6, 1e3)?;
             let path = c.document().file().parent().unwrap_or(std::path::Path::new("")).join(&file.0);
-            let hulls = read_obj_parts(&path, scale).map_err(|problem| {
+            let hulls = read_obj_parts(&path, *metres_per_unit).map_err(|problem| {
                 c.error(&format!("{key}.file"), problem, "give an OBJ file whose groups are convex parts")
             })?;
             Ok(ToolShape::Compound { hulls_m: hulls })
@@ -82,22 +74,16 @@ fn check_shape(c: &Check<'_>, key: &str, raw: &RawShape) -> Result<ToolShape, Co
 }
 
 fn check_coupling(c: &Check<'_>, key: &dyn Fn(&str) -> String, raw: &RawTool) -> Result<Coupling, ConfigError> {
-    let keys = [
-        ("coupling_stiffness_n_per_m", raw.coupling_stiffness_n_per_m, 1.0, 1e5),
-        ("coupling_damping_n_s_per_m", raw.coupling_damping_n_s_per_m, 0.0, 1e3),
-        ("proxy_mass_kg", raw.proxy_mass_kg, 1e-4, 1.0),
-        ("coupling_lever_m", raw.coupling_lever_m, 1e-3, 1.0),
-        ("max_force_n", raw.max_force_n, 0.01, 1e3),
-        ("max_torque_n_m", raw.max_torque_n_m, 1e-4, 100.0),
-    ];
-    for (name, value, least, most) in keys {
-        match (raw.coupling, value) {
-            (RawCoupling::Rigid, _) => c.absent(&key(name), &value, "coupling = \"rigid\"")?,
-            (RawCoupling::Spring, Some(value)) => drop(c.number(&key(name), value, least, most)?),
-            (RawCoupling::Spring, None) => {}
-        }
-    }
     if raw.coupling == RawCoupling::Rigid {
+        let of_the_spring = [
+            ("coupling_stiffness_n_per_m", raw.coupling_stiffness_n_per_m),
+            ("coupling_damping_n_s_per_m", raw.coupling_damping_n_s_per_m),
+            ("proxy_mass_kg", raw.proxy_mass_kg),
+            ("coupling_lever_m", raw.coupling_lever_m),
+            ("max_force_n", raw.max_force_n),
+            ("max_torque_n_m", raw.max_torque_n_m),
+        ];
+        of_the_spring.iter().try_for_each(|(name, value)| c.absent(&key(name), value, "coupling = \"rigid\""))?;
         return Ok(Coupling::Rigid);
     }
     let d = SpringCoupling::default();
@@ -120,7 +106,7 @@ fn check_sampling(c: &Check<'_>, key: &dyn Fn(&str) -> String, raw: &RawTool) ->
         }
         RawSampling::Interpolate => {
             let delay_ms = c.required(&delay_key, raw.delay_ms, "sampling = \"interpolate\"")?;
-            Ok(Sampling::Interpolate { delay_s: 1e-3 * c.number(&delay_key, delay_ms, 0.0, 500.0)? })
+            Ok(Sampling::Interpolate { delay_s: 1e-3 * delay_ms })
         }
     }
 }

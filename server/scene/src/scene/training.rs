@@ -10,7 +10,6 @@ use super::raw::{
 use crate::checks::Check;
 use crate::error::ConfigError;
 
-const MAX_EXAMPLES: u32 = 100_000;
 /// A direction shorter than this is none.
 const SHORTEST_DIRECTION: f64 = 1e-6;
 
@@ -75,9 +74,9 @@ pub(super) fn check(
     let ranges = PressRanges {
         region: check_boxes(c, &at("contact_regions"), &raw.contact_regions)?,
         approach: check_approach(c, &at("approach"), &raw.approach)?,
-        depth_share: range(c, &at("depth_share"), raw.depth_share, [1e-3, 0.95])?,
-        drag_m: range(c, &at("drag_m"), raw.drag_m, [0.0, 1.0])?,
-        drag_share: c.number(&at("drag_share"), raw.drag_share, 0.0, 1.0)?,
+        depth_share: rising(c, &at("depth_share"), raw.depth_share)?,
+        drag_m: rising(c, &at("drag_m"), raw.drag_m)?,
+        drag_share: raw.drag_share,
     };
     let [contact_m, motion_m] = raw.feature_scales_m;
     let evaluation = &raw.evaluation;
@@ -89,25 +88,20 @@ pub(super) fn check(
     let outside = outside.map(|(i, set)| check_outside(c, &at(&format!("evaluation.outside.{i}")), set, &ranges));
     Ok(TrainingConfig {
         tool: check_tool(c, &at("tool"), raw.tool.as_deref(), tools)?,
-        examples: c.count(&at("examples"), raw.examples, 1, MAX_EXAMPLES)?,
+        examples: raw.examples,
         seed: raw.seed,
         candidates_per_example: match raw.sampling {
             RawInteractionSampling::Random => 1,
-            RawInteractionSampling::FarthestPoint => {
-                c.count(&at("candidates_per_example"), raw.candidates_per_example, 2, 1000)?
-            }
+            RawInteractionSampling::FarthestPoint => raw.candidates_per_example,
         },
-        features: FeatureScales {
-            contact_m: c.number(&at("feature_scales_m"), contact_m, 1e-6, 10.0)?,
-            motion_m: c.number(&at("feature_scales_m"), motion_m, 1e-6, 10.0)?,
-        },
+        features: FeatureScales { contact_m, motion_m },
         recorded: raw.recorded.as_ref().map(|r| RecordedConfig { file: r.file.0.clone(), fit: r.fit }),
         stamp_axes: [
             direction(c, &at("stamp_axes"), raw.stamp_axes[0])?,
             direction(c, &at("stamp_axes"), raw.stamp_axes[1])?,
         ],
-        drive: check_drive(c, &at("drive"), &raw.drive)?,
-        evaluation_examples: c.count(&at("evaluation.examples"), evaluation.examples, 1, MAX_EXAMPLES)?,
+        drive: drive(&raw.drive),
+        evaluation_examples: evaluation.examples,
         evaluation_seed: evaluation.seed,
         outside: outside.collect::<Result<_, _>>()?,
         ranges,
@@ -142,19 +136,18 @@ fn check_outside(
     }
     let boxes = raw.contact_regions.as_ref().map(|b| check_boxes(c, &at("contact_regions"), b));
     let approach = raw.approach.as_ref().map(|a| check_approach(c, &at("approach"), a));
-    let depth = raw.depth_share.map(|d| range(c, &at("depth_share"), d, [1e-3, 0.95]));
-    let drag = raw.drag_m.map(|d| range(c, &at("drag_m"), d, [0.0, 1.0]));
-    let share = raw.drag_share.map(|s| c.number(&at("drag_share"), s, 0.0, 1.0));
+    let depth = raw.depth_share.map(|d| rising(c, &at("depth_share"), d));
+    let drag = raw.drag_m.map(|d| rising(c, &at("drag_m"), d));
     Ok(OutsideConfig {
         name: raw.name.clone(),
         lifts,
-        examples: c.count(&at("examples"), raw.examples, 1, MAX_EXAMPLES)?,
+        examples: raw.examples,
         ranges: PressRanges {
             region: boxes.transpose()?.unwrap_or_else(|| training.region.clone()),
             approach: approach.transpose()?.unwrap_or(training.approach),
             depth_share: depth.transpose()?.unwrap_or(training.depth_share),
             drag_m: drag.transpose()?.unwrap_or(training.drag_m),
-            drag_share: share.transpose()?.unwrap_or(training.drag_share),
+            drag_share: raw.drag_share.unwrap_or(training.drag_share),
         },
     })
 }
@@ -172,21 +165,19 @@ fn check_approach(c: &Check<'_>, key: &str, raw: &RawApproach) -> Result<Approac
     })
 }
 
-fn check_drive(c: &Check<'_>, key: &str, raw: &RawDrive) -> Result<DriveOptions, ConfigError> {
-    let number = |name: &str, value, least, most| c.number(&format!("{key}.{name}"), value, least, most);
-    Ok(DriveOptions {
-        speed_m_per_s: number("speed_m_per_s", raw.speed_m_per_s, 1e-3, 1.0)?,
-        mass_damping_per_s: number("mass_damping_per_s", raw.mass_damping_per_s, 0.0, 1e3)?,
-        settled_m: number("settled_m", raw.settled_m, 1e-8, 0.01)?,
-        window_s: number("window_s", raw.window_s, 1e-3, 10.0)?,
-        patience_s: number("patience_s", raw.patience_s, 0.01, 600.0)?,
-        tolerated_m: number("tolerated_m", raw.tolerated_m, 1e-8, 0.01)?,
-    })
+fn drive(raw: &RawDrive) -> DriveOptions {
+    DriveOptions {
+        speed_m_per_s: raw.speed_m_per_s,
+        mass_damping_per_s: raw.mass_damping_per_s,
+        settled_m: raw.settled_m,
+        window_s: raw.window_s,
+        patience_s: raw.patience_s,
+        tolerated_m: raw.tolerated_m,
+    }
 }
 
-/// Least and largest, in this order.
-fn range(c: &Check<'_>, key: &str, value: [f64; 2], [least, most]: [f64; 2]) -> Result<[f64; 2], ConfigError> {
-    value.iter().try_for_each(|v| c.number(key, *v, least, most).map(drop))?;
+/// Least and largest value, in this order.
+fn rising(c: &Check<'_>, key: &str, value: [f64; 2]) -> Result<[f64; 2], ConfigError> {
     if value[0] <= value[1] {
         return Ok(value);
     }
@@ -194,8 +185,7 @@ fn range(c: &Check<'_>, key: &str, value: [f64; 2], [least, most]: [f64; 2]) -> 
 }
 
 fn direction(c: &Check<'_>, key: &str, value: [f64; 3]) -> Result<Vector3<f64>, ConfigError> {
-    let vector = c.vector(key, value)?;
-    vector.try_normalize(SHORTEST_DIRECTION).ok_or_else(|| {
+    Vector3::from(value).try_normalize(SHORTEST_DIRECTION).ok_or_else(|| {
         c.error(key, format!("{value:?} has no direction; its length must be 1e-6 or more"), "down is [0, 0, -1]")
     })
 }

@@ -19,11 +19,14 @@ pub struct RawEnrichment {
     pub interpolation: RawInterpolation,
     /// Coordinates around a contact point.
     pub coordinates: RawCoordinates,
-    /// Radius of the chart around a contact point, in coarse cells, 0.5 to 64.
+    /// Radius of the chart around a contact point, in coarse cells.
+    #[schemars(range(min = 0.5, max = 64.0))]
     pub radius_cells: f64,
-    /// Texels of a stamp per side, 8 to 256.
+    /// Texels of a stamp per side.
+    #[schemars(range(min = 8, max = 256))]
     pub texels: u32,
-    /// Modes that the examples' detail is reduced to, 1 to 100000; as many as examples or more keep the examples.
+    /// Modes that the examples' detail is reduced to; as many as examples or more keep the examples.
+    #[schemars(range(min = 1, max = 100_000))]
     pub modes: u32,
     /// Whether detail that the examples do not cover fades to the coarse skin. Of `kriging` only; `ssh12` always does.
     pub fade: bool,

@@ -1,4 +1,4 @@
-//! What a scene says about its accurate model and about training, as typed.
+//! Accurate model and training of a scene, as typed.
 
 #![allow(rustdoc::broken_intra_doc_links, reason = "units in brackets; the schema shows this text as it is")]
 
@@ -6,19 +6,25 @@ use plica_training::{DriveOptions, FeatureScales};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{RawBox, RawFile};
+use super::{LARGEST_M, RawBox, RawFile};
+
+/// Most interactions of a set.
+const MAX_EXAMPLES: u32 = 100_000;
 
 /// Quasi-static model that examples are made with. Supports and regions are the object's.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawAccurate {
     /// Hexahedra along x, y, z; three times the coarse ones where left out.
+    #[schemars(inner(range(min = 1, max = 1000)))]
     pub divisions: Option<[u32; 3]>,
     /// Material law.
     pub model: RawMaterialModel,
-    /// Young's modulus in place of the object's [Pa], 10 to 1e9.
+    /// Young's modulus in place of the object's [Pa].
+    #[schemars(range(min = 10.0, max = 1e9))]
     pub young_modulus_pa: Option<f64>,
-    /// Poisson's ratio in place of the object's [-], 0 to 0.4999.
+    /// Poisson's ratio in place of the object's [-].
+    #[schemars(range(min = 0.0, max = 0.4999))]
     pub poisson_ratio: Option<f64>,
 }
 
@@ -39,47 +45,57 @@ pub enum RawMaterialModel {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawTie {
-    /// A pressure of Young's modulus stretches the tie by this much [m], 1e-8 to 0.01.
+    /// Stretch of the tie under a pressure as large as Young's modulus [m].
+    #[schemars(range(min = 1e-8, max = 0.01))]
     pub compliance_m: f64,
-    /// Skin vertices nearer to the tool than this are tied [m], 1e-5 to 0.05.
+    /// Distance to the tool below which skin vertices are tied [m].
+    #[schemars(range(min = 1e-5, max = 0.05))]
     pub band_m: f64,
-    /// Share of the stiffness left where the band ends [-], 1e-8 to 1; between, it falls exponentially.
+    /// Share of the stiffness left at the end of the band, with exponential decay up to there [-].
+    #[schemars(range(min = 1e-8, max = 1.0))]
     pub rim_floor: f64,
 }
 
-/// What `plicad train` does.
+/// Interactions and sampling of `plicad train`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawTraining {
     /// Tool that interacts; the first one by name where left out.
     pub tool: Option<String>,
-    /// Interactions, 1 to 100000.
+    /// Interactions.
+    #[schemars(range(min = 1, max = MAX_EXAMPLES))]
     pub examples: u32,
     /// Seed of the interactions.
     pub seed: u64,
     /// How interactions are chosen among those that are drawn.
     pub sampling: RawInteractionSampling,
-    /// Farthest points: how many are drawn for each one kept, 2 to 1000.
+    /// Farthest-point sampling: candidates drawn for each example kept.
+    #[schemars(range(min = 2, max = 1000))]
     pub candidates_per_example: u32,
-    /// Farthest points: what contact points, and what presses and drags are divided by [m], 1e-6 to 10.
+    /// Farthest-point sampling: length scales of contact points, and of presses and drags [m].
+    #[schemars(inner(range(min = 1e-6, max = 10.0)))]
     pub feature_scales_m: [f64; 2],
     /// Boxes on the resting skin that contact points lie in; none: wherever the skin faces the tool.
     pub contact_regions: Vec<RawBox>,
     /// Direction of the press: "vertical" (down), "normal" (against the skin), or x, y, z. The tool's z axis points the other way.
     pub approach: RawApproach,
-    /// Least and largest depth beyond first touch, as a share of the thickness there along the approach, 0.001 to 0.95.
+    /// Least and largest depth beyond first touch, as a share of the thickness there along the approach.
+    #[schemars(inner(range(min = 1e-3, max = 0.95)))]
     pub depth_share: [f64; 2],
-    /// Least and largest length of the drag along the skin's tangent plane [m], 0 to 1.
+    /// Least and largest length of the drag along the skin's tangent plane [m].
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub drag_m: [f64; 2],
-    /// Share of the interactions that drag, 0 to 1.
+    /// Share of the interactions that drag.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub drag_share: f64,
     /// States picked from a recorded motion, in place of drawn ones.
     pub recorded: Option<RawRecorded>,
     /// Axis along whose tangential part stamps are laid out, and one that stands in where it is normal to the skin.
+    #[schemars(inner(inner(range(min = -LARGEST_M, max = LARGEST_M))))]
     pub stamp_axes: [[f64; 3]; 2],
     /// How the real-time model is driven to a pose.
     pub drive: RawDrive,
-    /// Interactions that are never trained on.
+    /// Interactions kept apart from training.
     pub evaluation: RawEvaluation,
 }
 
@@ -87,7 +103,7 @@ pub struct RawTraining {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RawInteractionSampling {
-    /// Those that lie as far from each other as can be.
+    /// Farthest-point sampling among the candidates.
     FarthestPoint,
     /// As they are drawn.
     Random,
@@ -100,7 +116,7 @@ pub enum RawApproach {
     /// By name.
     Named(RawApproachName),
     /// Towards x, y, z; need not be of unit length.
-    Direction([f64; 3]),
+    Direction(#[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))] [f64; 3]),
 }
 
 /// Directions with a name.
@@ -128,56 +144,67 @@ pub struct RawRecorded {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawDrive {
-    /// Speed of the tool [m/s], 1e-3 to 1.
+    /// Speed of the tool [m/s].
+    #[schemars(range(min = 1e-3, max = 1.0))]
     pub speed_m_per_s: f64,
-    /// Least damping proportional to mass while training [1/s], 0 to 1000; what is at rest does not depend on it.
+    /// Least damping proportional to mass while training [1/s]; what is at rest does not depend on it.
+    #[schemars(range(min = 0.0, max = 1e3))]
     pub mass_damping_per_s: f64,
-    /// Settled if no node has moved farther than this [m], 1e-8 to 0.01 ...
+    /// Largest displacement within `window_s` of an object that counts as settled [m].
+    #[schemars(range(min = 1e-8, max = 0.01))]
     pub settled_m: f64,
-    /// ... within this time [s], 0.001 to 10.
+    /// Time within which displacements are compared with `settled_m` [s].
+    #[schemars(range(min = 1e-3, max = 10.0))]
     pub window_s: f64,
-    /// Longest wait for that [s], 0.01 to 600.
+    /// Longest wait until the object has settled [s].
+    #[schemars(range(min = 0.01, max = 600.0))]
     pub patience_s: f64,
-    /// What is not settled by then is rejected if a node still moves farther than this within the window [m], 1e-8 to 0.01.
+    /// Largest displacement within `window_s` of an accepted interaction after `patience_s` [m].
+    #[schemars(range(min = 1e-8, max = 0.01))]
     pub tolerated_m: f64,
 }
 
-/// Interactions that are never trained on.
+/// Interactions kept apart from training.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawEvaluation {
-    /// Interactions drawn at random as those of training are, 1 to 100000.
+    /// Interactions drawn at random as those of training are.
+    #[schemars(range(min = 1, max = MAX_EXAMPLES))]
     pub examples: u32,
     /// Seed; another one than that of training.
     pub seed: u64,
-    /// Sets outside of what is trained.
+    /// Sets outside of the trained ranges.
     pub outside: Vec<RawOutside>,
 }
 
-/// A set of interactions outside of what is trained. Keys left out are those of training.
+/// A set of interactions outside of the trained ranges. Keys left out are those of training.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawOutside {
     /// Kind of its examples in the database; several sets may share it.
     pub name: String,
-    /// What happens at the contact point.
+    /// Action at the contact point.
     #[serde(default)]
     pub action: RawAction,
-    /// Interactions, 1 to 100000.
+    /// Interactions.
+    #[schemars(range(min = 1, max = MAX_EXAMPLES))]
     pub examples: u32,
     /// Boxes on the resting skin that contact points lie in.
     pub contact_regions: Option<Vec<RawBox>>,
     /// Direction of the press.
     pub approach: Option<RawApproach>,
     /// Least and largest depth, or height of a lift, as a share of the local thickness.
+    #[schemars(inner(range(min = 1e-3, max = 0.95)))]
     pub depth_share: Option<[f64; 2]>,
     /// Least and largest length of the drag [m].
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub drag_m: Option<[f64; 2]>,
     /// Share of the interactions that drag.
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub drag_share: Option<f64>,
 }
 
-/// What happens at a contact point.
+/// Action at a contact point.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RawAction {
