@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 pub mod arrows;
 pub mod citations;
+pub mod sources;
 
 /// Root of the repository.
 pub fn repository() -> PathBuf {
