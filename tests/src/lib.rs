@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 pub mod arrows;
 pub mod citations;
 pub mod sources;
+pub mod words;
 
 /// Root of the repository.
 pub fn repository() -> PathBuf {
