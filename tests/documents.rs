@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use plica_tests::citations::{bibliography_keys, cited_keys, named_paths};
+use plica_tests::words::{HOUSE_WORDS, lines_with};
 use plica_tests::{files, read, repository};
 
 const CITING: [&str; 5] = [".rs", ".md", ".toml", ".py", ".wgsl"];
@@ -56,4 +57,35 @@ fn keys_and_paths_are_recognised() {
     assert_eq!(bibliography_keys(bibliography).len(), 2);
     let text = "`sim/src/step.rs`, `MATH.md`, `rpc/step`, [a](docs/a.png), [b](https://x.org/y), `A dv = r`\n```\n`no.rs`\n```";
     assert_eq!(named_paths(text, &["sim".to_owned()]), ["docs/a.png", "sim/src/step.rs", "MATH.md"]);
+}
+
+#[test]
+fn comments_and_messages_use_the_words_of_the_glossary() {
+    let folders = ["server", "clients", "protocol"].map(|folder| repository().join(folder));
+    let sources: Vec<_> = folders.iter().flat_map(|folder| files(folder, &[".rs"])).collect();
+    for house in HOUSE_WORDS {
+        let places = sources.iter().flat_map(|path| {
+            let lines = lines_with(&read(path), house.word);
+            lines.into_iter().map(move |line| format!("{}:{line}", path.display()))
+        });
+        let places: Vec<String> = places.collect();
+        let (found, left) = (places.len(), house.n_left);
+        assert!(
+            found <= left,
+            "{found} lines say \"{}\", {left} may; the term is {}:\n{}",
+            house.word,
+            house.term,
+            places.join("\n")
+        );
+        assert!(found == left, "only {found} lines say \"{}\": set its n_left from {left} to {found}", house.word);
+    }
+}
+
+#[test]
+fn house_words_are_found_in_comments_and_strings_only() {
+    assert_eq!(
+        lines_with("/// The Verdict.\nlet verdict = judge(\"a verdict\");\nlet verdict = 1;", "verdict"),
+        [1, 2]
+    );
+    assert_eq!(lines_with("// confirm, firmer, firm_up", "firm"), [0; 0]);
 }

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 pub mod arrows;
 pub mod citations;
+pub mod sources;
+pub mod words;
 
 /// Root of the repository.
 pub fn repository() -> PathBuf {
