@@ -5,6 +5,7 @@
 
 mod box_tree;
 mod clusters;
+mod convex_polytope;
 mod embedding;
 mod exponential_map;
 pub mod export;
@@ -21,6 +22,7 @@ pub mod shapes;
 mod skin;
 
 pub use clusters::CLUSTER_SIZE;
+pub use convex_polytope::{ConvexPolytope, FaceDistance, FacePlane, HullError};
 pub use embedding::{DEFAULT_SUPPORT_CELLS, Embedding, EmbeddingError, EmbeddingKind, MAX_OUTSIDE_CELLS};
 pub use exponential_map::{ExponentialMaps, Mapped};
 pub use hex_mesh::{HEX_FACES, HexMesh, MeshError};

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use plica_geometry::{ConvexPolytope, HullError};
 use plica_sim::{Coupling, Sampling, SpringCoupling, ToolDescription, ToolShape};
 
 use super::checks::Check;
@@ -59,7 +60,9 @@ fn check_shape(c: &Check<'_>, key: &str, raw: &RawShape) -> Result<ToolShape, Co
             }
             c.count(&key, points_m.len() as u32, 4, 1000)?;
             let points = points_m.iter().map(|p| c.point(&key, *p));
-            Ok(ToolShape::ConvexHull { points_m: points.collect::<Result<_, _>>()? })
+            let polytope = ConvexPolytope::hull(points.collect::<Result<_, _>>()?);
+            let flat = |e: HullError| c.error(&key, e.to_string(), "add points that do not lie in one plane");
+            Ok(ToolShape::ConvexHull { polytope: polytope.map_err(flat)? })
         }
         RawShape::Mesh { file, metres_per_unit } => {
             let key = format!("{key}.mesh");
@@ -68,7 +71,12 @@ fn check_shape(c: &Check<'_>, key: &str, raw: &RawShape) -> Result<ToolShape, Co
             let hulls = obj::read_parts(&path, scale).map_err(|problem| {
                 c.error(&format!("{key}.file"), problem, "give an OBJ file whose groups are convex parts")
             })?;
-            Ok(ToolShape::Compound { hulls_m: hulls })
+            let polytopes = hulls.into_iter().map(ConvexPolytope::hull).collect::<Result<_, _>>();
+            let flat = |e: HullError| {
+                let problem = format!("{}: {e}", path.display());
+                c.error(&format!("{key}.file"), problem, "give an OBJ file whose groups have a volume each")
+            };
+            Ok(ToolShape::Compound { polytopes: polytopes.map_err(flat)? })
         }
     }
 }
