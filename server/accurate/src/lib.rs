@@ -7,6 +7,7 @@
 //! Arithmetic is `f64` in SI units. This crate knows no bus, no thread and no clock; a callback is told of progress and may
 //! cancel. The same input gives the same bits.
 
+mod assembly;
 mod constraints;
 pub mod contact;
 mod energy;

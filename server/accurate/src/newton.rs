@@ -1,21 +1,22 @@
 //! Newton's method with a line search on a sum of energies.
 
-mod acceptance;
 mod direction;
-mod follower;
+mod gmres;
 mod line_search;
 mod report;
+mod sufficient_decrease;
 
 use std::ops::ControlFlow;
 
 use nalgebra::Vector3;
 
+use crate::assembly::empty_hessian;
 use crate::constraints::Constraints;
 use crate::energy::Energy;
 use crate::factor::{Factor, FactorError};
 use crate::hessian::Hessian;
-use acceptance::Total;
 pub use report::{Info, Params, Progress, SolveError};
+use sufficient_decrease::Total;
 
 /// Forces below this share of stiffness times position are rounding.
 const FORCE_ROUNDING: f64 = 256.0 * f64::EPSILON;
@@ -64,7 +65,7 @@ impl Solver {
     /// # Errors
     /// [`FactorError`]: no memory.
     pub fn new(constraints: &Constraints, energies: &[&dyn Energy]) -> Result<Self, FactorError> {
-        let hessian = Hessian::new(constraints, energies);
+        let hessian = empty_hessian(constraints, energies);
         let factor = Factor::new(&hessian, energies.iter().find_map(|e| e.rest_positions()))?;
         let zeros = || vec![Vector3::zeros(); constraints.n_nodes()];
         Ok(Self {

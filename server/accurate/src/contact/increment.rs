@@ -6,9 +6,9 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::friction::{Friction, FrictionRow};
 use super::normal::NormalContact;
-use super::outcome::ContactInfo;
 use super::params::ContactParams;
 use super::press::Press;
+use super::result::{ContactError, ContactInfo};
 use super::state::ContactState;
 use crate::constraints::Constraints;
 use crate::energy::Energy;
@@ -53,6 +53,26 @@ pub(super) enum Failure {
     Solve(SolveError),
     /// Pressures still moved after the last update.
     Unsettled(Fit),
+}
+
+impl Failure {
+    /// Fails if halving the increment cannot help, or was done often enough.
+    pub(super) fn give_up(self, share: f64, halvings: u32, params: &ContactParams) -> Result<(), ContactError> {
+        let may_help = halvings < params.max_halvings;
+        match self {
+            Self::Solve(SolveError::Cancelled { .. }) => Err(ContactError::Cancelled { share }),
+            Self::Solve(source @ SolveError::Factor(_)) => Err(ContactError::Solve { share, halvings, source }),
+            _ if may_help => Ok(()),
+            Self::Solve(source) => Err(ContactError::Solve { share, halvings, source }),
+            Self::Unsettled(fit) => Err(ContactError::Unsettled {
+                share,
+                halvings,
+                pressure_change: fit.pressure_change,
+                traction_change: fit.traction_change,
+                max_updates: params.max_updates,
+            }),
+        }
+    }
 }
 
 impl<'a> Increment<'a> {

@@ -2,8 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::outcome::ContactInfo;
 use super::press::Press;
+use super::result::ContactInfo;
 use super::state::ContactState;
 
 /// Fills in what can be read off the contact points: force on the tool `sum A (t - p n)`, its torque, area, and errors.

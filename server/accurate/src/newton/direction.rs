@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Info, Problem, SolveError, Solver, clear_given, dot, follower};
+use super::{Info, Problem, SolveError, Solver, clear_given, dot, gmres};
 use crate::energy::Projection;
 
 /// First shift of a matrix that stays indefinite, as a share of its mean diagonal; every further one is ten times larger.
@@ -79,7 +79,7 @@ impl Solver {
     fn follow_loads(&mut self, problem: &Problem<'_>, loads: Projection, x: &[Vector3<f64>]) {
         let (hessian, factor, product) = (&self.hessian, &mut self.factor, &mut self.single);
         let mut direction = self.direction.clone();
-        follower::solve(&mut direction, |v, out| {
+        gmres::solve(&mut direction, |v, out| {
             product.fill(Vector3::zeros());
             problem.energies.iter().for_each(|e| e.add_remainder_product(x, v, loads, product));
             clear_given(product, problem.constraints);

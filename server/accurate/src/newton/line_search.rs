@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::acceptance::{Judgement, Start, Total};
+use super::sufficient_decrease::{Judgement, Start, Total};
 use super::{Info, Problem, Residual, Solver, dot};
 
 /// Share of the slope that may be left after a step that is judged by its slope \[HZ05\].

@@ -1,10 +1,10 @@
-//! One leg of a tool's path, in increments that are halved where they fail.
+//! Increments between two poses of a tool: step-size control by halving.
 
 use nalgebra::Isometry3;
 
 /// From one pose to the next: `n_increments` whole increments, of which `done` are behind.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Leg {
+pub(super) struct Increments {
     from: Isometry3<f64>,
     to: Isometry3<f64>,
     n_increments: f64,
@@ -12,7 +12,7 @@ pub(super) struct Leg {
     halvings: u32,
 }
 
-impl Leg {
+impl Increments {
     pub(super) fn new(from: &Isometry3<f64>, to: &Isometry3<f64>, motion_m: f64, max_increment_m: f64) -> Self {
         let n_increments = (motion_m / max_increment_m).ceil().max(1.0);
         Self { from: *from, to: *to, n_increments, done: 0.0, halvings: 0 }

@@ -2,8 +2,6 @@
 
 use nalgebra::Vector3;
 
-use super::increment::Failure;
-use super::params::ContactParams;
 use crate::newton::{Progress, SolveError};
 
 /// How a press went.
@@ -89,24 +87,4 @@ pub enum ContactError {
         /// Updates of the multipliers.
         max_updates: u32,
     },
-}
-
-impl Failure {
-    /// Fails if halving the increment cannot help, or was done often enough.
-    pub(super) fn give_up(self, share: f64, halvings: u32, params: &ContactParams) -> Result<(), ContactError> {
-        let may_help = halvings < params.max_halvings;
-        match self {
-            Self::Solve(SolveError::Cancelled { .. }) => Err(ContactError::Cancelled { share }),
-            Self::Solve(source @ SolveError::Factor(_)) => Err(ContactError::Solve { share, halvings, source }),
-            _ if may_help => Ok(()),
-            Self::Solve(source) => Err(ContactError::Solve { share, halvings, source }),
-            Self::Unsettled(fit) => Err(ContactError::Unsettled {
-                share,
-                halvings,
-                pressure_change: fit.pressure_change,
-                traction_change: fit.traction_change,
-                max_updates: params.max_updates,
-            }),
-        }
-    }
 }
