@@ -49,12 +49,14 @@ impl Problem<'_> {
     }
 }
 
+/// Forces out of balance, `g = sum_e g_e` at free coordinates, with the gradients `g_e` of single energies.
 #[derive(Debug, Clone, Copy)]
 struct Residual {
-    /// Largest force at a free node over the largest nodal force of a single energy. Where forces are mere rounding, as
-    /// after a rigid motion, they count as within the tolerance.
+    /// `max_n |g_n| / max(max_e,n |g_e,n|, F / tolerance)`, 0 for `g = 0`. Forces below the rounding
+    /// `F = 256 eps k max_n |x_n|`, with the mean diagonal `k` of the last Hessian, are so within the tolerance, as after a
+    /// rigid motion.
     relative: f64,
-    /// Norm of the force at free coordinates \[N\].
+    /// `|g|` \[N\].
     norm: f64,
 }
 
@@ -123,6 +125,22 @@ impl Solver {
         }
         info.smallest_jacobian = energies.iter().filter_map(|e| e.smallest_jacobian(x)).reduce(f64::min);
         Ok(info)
+    }
+
+    /// Residual at `x` as in [`Info::residuals`], for a solve to `tolerance`.
+    ///
+    /// # Panics
+    /// If the lengths of `x` and `constraints` are not those of the analysis.
+    pub(crate) fn residual(
+        &mut self,
+        energies: &[&dyn Energy],
+        constraints: &Constraints,
+        tolerance: f64,
+        x: &[Vector3<f64>],
+    ) -> f64 {
+        assert_eq!((x.len(), constraints.n_nodes()), (self.gradient.len(), self.gradient.len()), "nodes");
+        let params = &Params { tolerance, ..Params::default() };
+        self.find_residual(&Problem { energies, constraints, params }, x).relative
     }
 
     /// One Newton step. While given coordinates still move, the free ones follow linearly whatever the energy says.

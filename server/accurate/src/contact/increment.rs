@@ -10,7 +10,6 @@ use super::params::ContactParams;
 use super::press::Press;
 use super::result::{ContactError, ContactInfo};
 use super::state::ContactState;
-use crate::constraints::Constraints;
 use crate::energy::Energy;
 use crate::newton::{Info, Params, Progress, SolveError, Solver};
 
@@ -76,7 +75,7 @@ impl Failure {
 }
 
 impl<'a> Increment<'a> {
-    /// Of the tool's motion to `pose`, one of the path's or on the way to one, from where it is in `state`.
+    /// From the tool pose in `state` to `pose`, a waypoint or a point between two.
     pub(super) fn new(press: &'a Press<'a>, state: &ContactState, pose: &Isometry3<f64>, is_on_the_way: bool) -> Self {
         let ContactParams { young_modulus_pa, penalty_ratio, friction_penalty_ratio, .. } = press.params;
         let [looser_pressures, looser_forces] = if is_on_the_way { ON_THE_WAY } else { [1.0; 2] };
@@ -174,7 +173,9 @@ impl<'a> Increment<'a> {
         let friction = Friction { surface, rows: &self.rows, penalties_pa_per_m: &self.friction_penalties };
         let mut energies: Vec<&dyn Energy> = self.press.energies.to_vec();
         energies.extend([&normal as &dyn Energy, &friction]);
-        let tolerance = tolerance(residual(&energies, constraints, x)).max(self.newton_tolerance);
+        // To a tolerance of 1, so that forces count as rounding only where they are.
+        let first = solver.residual(&energies, constraints, 1.0, x);
+        let tolerance = tolerance(first).max(self.newton_tolerance);
         let newton = Params { tolerance, max_iterations: params.max_newton_iterations };
         let mut steps = 0;
         let mut count = |progress: Progress| {
@@ -218,22 +219,4 @@ impl<'a> Increment<'a> {
         (self.pressures, self.tractions) = (pressures, tractions);
         fit
     }
-}
-
-/// Largest force at a free coordinate, as a share of the largest nodal force of any single energy.
-fn residual(energies: &[&dyn Energy], constraints: &Constraints, x: &[Vector3<f64>]) -> f64 {
-    let zeros = || vec![Vector3::zeros(); x.len()];
-    let (mut sum, mut largest) = (zeros(), 0.0_f64);
-    for energy in energies {
-        let mut single = zeros();
-        energy.add_gradient(x, &mut single);
-        largest = single.iter().map(Vector3::norm).fold(largest, f64::max);
-        sum.iter_mut().zip(single).for_each(|(sum, force): (&mut Vector3<f64>, _)| *sum += force);
-    }
-    let free = |(node, force): (usize, &Vector3<f64>)| {
-        let given = constraints.is_given(node);
-        Vector3::from_fn(|k, _| if given[k] { 0.0 } else { force[k] }).norm()
-    };
-    let left = sum.iter().enumerate().map(free).fold(0.0, f64::max);
-    if left == 0.0 { 0.0 } else { left / largest }
 }
