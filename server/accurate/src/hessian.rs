@@ -1,4 +1,4 @@
-//! The sparse symmetric matrix that energies add to: lower triangle by columns, on a fixed pattern of node pairs.
+//! Sparse symmetric matrix: lower triangle by columns, on a fixed pattern of node pairs.
 
 use nalgebra::{Matrix3, Vector3};
 use plica_geometry::NodeIdx;
@@ -11,7 +11,7 @@ pub(crate) type VisitStencils<'a> = dyn Fn(&mut dyn FnMut(&[NodeIdx])) + 'a;
 /// Second derivatives of a sum of energies \[N/m\].
 ///
 /// The matrix is kept over the nodes that have a free coordinate. Rows and columns of given coordinates are those of the
-/// identity; what they contribute to the right-hand side, `-H_free,given dx_given`, is gathered in `lift`.
+/// identity; their contribution to the right-hand side, `-H_free,given dx_given`, is in `lift`.
 #[derive(Debug, Clone)]
 pub struct Hessian {
     /// Block row and column of each node; `u32::MAX` for nodes that are given altogether.

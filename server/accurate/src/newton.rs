@@ -35,7 +35,7 @@ pub struct Solver {
     stiffness: f64,
 }
 
-/// What is minimised, where, and how far.
+/// Minimisation problem: energies, constraints and stopping criteria.
 #[derive(Clone, Copy)]
 struct Problem<'a> {
     energies: &'a [&'a dyn Energy],
@@ -83,7 +83,7 @@ impl Solver {
         })
     }
 
-    /// Free unknowns, and values of the Cholesky factor: what a solve costs.
+    /// Number of free unknowns, and of values in the Cholesky factor.
     pub fn size(&self) -> (usize, usize) {
         (self.hessian.n_unknowns(), self.factor.n_values())
     }
@@ -159,7 +159,7 @@ impl Solver {
         went.then_some(()).ok_or(SolveError::LineSearch { iterations, residual })
     }
 
-    /// What given coordinates still have to move; whether any has.
+    /// Finds the remaining motion of given coordinates; returns whether any is left.
     fn find_motion(&mut self, constraints: &Constraints, x: &[Vector3<f64>]) -> bool {
         let mut moves = false;
         for (node, motion) in self.motion.iter_mut().enumerate() {

@@ -1,5 +1,5 @@
-//! Meshes of Plica and what depends on nothing but them: hexahedral meshes, the generated shapes of the
-//! scenes, triangle skins and their clusters, embedding weights, mesh files.
+//! Geometry of Plica: hexahedral meshes, generated shapes of the scenes, triangle skins and their clusters, convex
+//! polytopes, embedding weights, mesh files.
 //!
 //! Everything is `f64` in SI units (metres), right-handed, z up. This crate knows no physics, no bus and no clock.
 

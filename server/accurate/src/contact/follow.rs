@@ -51,7 +51,7 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Increment by increment; each begins with the motion of the one before, continued.
+    /// Moves the tool to `pose` in increments; each starts from an extrapolation of the one before.
     fn follow_to(
         &mut self,
         pose: &Isometry3<f64>,

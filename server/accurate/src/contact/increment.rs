@@ -13,9 +13,9 @@ use super::state::ContactState;
 use crate::energy::Energy;
 use crate::newton::{Info, Params, Progress, SolveError, Solver};
 
-/// Share of the forces out of balance that is left for the next multipliers: about one Newton step.
+/// Residual of a solve between two updates, as a share of the first: about one Newton step.
 const LEFT_TO_NEXT: f64 = 0.3;
-/// How much larger the tolerances of pressures and of forces are in increments that do not end at a pose of the path.
+/// Factors on the tolerances of pressures and forces in increments that end between two waypoints.
 const ON_THE_WAY: [f64; 2] = [3.0, 100.0];
 
 /// An increment under way.
@@ -34,10 +34,10 @@ pub(super) struct Increment<'a> {
     rows: Vec<FrictionRow>,
 }
 
-/// How well pressures fit positions.
+/// Convergence of pressures and positions.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Fit {
-    /// What the last solve changed of the pressures' continuous part, as a share of the largest pressure.
+    /// Change of the pressures' continuous part in the last solve, as a share of the largest pressure.
     pub(super) pressure_change: f64,
     /// The same of tractions.
     pub(super) traction_change: f64,
@@ -46,16 +46,16 @@ pub(super) struct Fit {
     pub(super) smallest_jacobian: Option<f64>,
 }
 
-/// Why an increment has no result.
+/// Failure of an increment.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Failure {
     Solve(SolveError),
-    /// Pressures still moved after the last update.
+    /// Pressures not settled after the last update.
     Unsettled(Fit),
 }
 
 impl Failure {
-    /// Fails if halving the increment cannot help, or was done often enough.
+    /// The error, unless the increment may be halved once more.
     pub(super) fn give_up(self, share: f64, halvings: u32, params: &ContactParams) -> Result<(), ContactError> {
         let may_help = halvings < params.max_halvings;
         match self {
@@ -158,8 +158,8 @@ impl<'a> Increment<'a> {
         }
     }
 
-    /// Solves with given multipliers until the residual is below `tolerance` of what it is at first, and not below the
-    /// press's own.
+    /// Solves with given multipliers to `tolerance` of the first residual, or to the increment's own tolerance if that is
+    /// larger.
     fn find_positions(
         &self,
         solver: &mut Solver,

@@ -8,20 +8,20 @@ use super::surface::ContactSurface;
 use crate::constraints::Constraints;
 use crate::energy::Energy;
 
-/// A solid and what it is pressed with.
+/// A solid and a tool pressed into it.
 #[derive(Clone, Copy)]
 pub struct Press<'a> {
     /// The solid and its loads.
     pub energies: &'a [&'a dyn Energy],
     /// Supports.
     pub constraints: &'a Constraints,
-    /// Where contact is looked for.
+    /// Contact points of the solid.
     pub surface: &'a ContactSurface,
     /// The tool's shape.
     pub obstacle: &'a Obstacle,
     /// Coulomb friction coefficient, `mu`.
     pub friction: f64,
-    /// How it is solved.
+    /// Solver parameters.
     pub params: ContactParams,
 }
 
