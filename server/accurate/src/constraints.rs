@@ -1,4 +1,4 @@
-//! Which degrees of freedom are given, and where they are.
+//! Dirichlet conditions: given coordinates and their targets.
 
 use nalgebra::Vector3;
 
@@ -36,7 +36,7 @@ impl Constraints {
         self.is_given[node]
     }
 
-    /// What the given coordinates of a node still have to move from `x` \[m\]; 0 for the others.
+    /// Remaining motion of the given coordinates of a node from `x` to their targets \[m\]; 0 for free ones.
     pub(crate) fn remaining(&self, node: usize, x: &Vector3<f64>) -> Vector3<f64> {
         let given = self.is_given[node];
         Vector3::from_fn(|k, _| if given[k] { self.target[node][k] - x[k] } else { 0.0 })

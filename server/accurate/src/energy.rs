@@ -1,4 +1,4 @@
-//! What can be minimised.
+//! Potential energies with gradient and Hessian.
 
 use nalgebra::Vector3;
 use plica_geometry::NodeIdx;

@@ -1,15 +1,17 @@
-//! The sparse symmetric matrix that energies add to: lower triangle by columns, on a fixed pattern of node pairs.
+//! Sparse symmetric matrix: lower triangle by columns, on a fixed pattern of node pairs.
 
 use nalgebra::{Matrix3, Vector3};
 use plica_geometry::NodeIdx;
 
 use crate::constraints::Constraints;
-use crate::energy::{Energy, Projection};
+
+/// Calls its argument with the nodes of every stencil.
+pub(crate) type VisitStencils<'a> = dyn Fn(&mut dyn FnMut(&[NodeIdx])) + 'a;
 
 /// Second derivatives of a sum of energies \[N/m\].
 ///
 /// The matrix is kept over the nodes that have a free coordinate. Rows and columns of given coordinates are those of the
-/// identity; what they contribute to the right-hand side, `-H_free,given dx_given`, is gathered in `lift`.
+/// identity; their contribution to the right-hand side, `-H_free,given dx_given`, is in `lift`.
 #[derive(Debug, Clone)]
 pub struct Hessian {
     /// Block row and column of each node; `u32::MAX` for nodes that are given altogether.
@@ -33,8 +35,8 @@ pub struct Hessian {
 const GIVEN: u32 = u32::MAX;
 
 impl Hessian {
-    /// An all-zero matrix with the pattern of `energies`.
-    pub(crate) fn new(constraints: &Constraints, energies: &[&dyn Energy]) -> Self {
+    /// All-zero matrix that couples the nodes of every stencil.
+    pub(crate) fn new(constraints: &Constraints, visit_stencils: &VisitStencils<'_>) -> Self {
         let n_nodes = constraints.n_nodes();
         let is_given: Vec<_> = (0..n_nodes).map(|n| constraints.is_given(n)).collect();
         let mut block_of_node = vec![GIVEN; n_nodes];
@@ -45,7 +47,7 @@ impl Hessian {
                 node_of_block.push(node as u32);
             }
         }
-        let columns = pattern(&block_of_node, node_of_block.len(), energies);
+        let columns = pattern(&block_of_node, node_of_block.len(), visit_stencils);
         let mut column_starts = vec![0];
         let mut value_starts = vec![0];
         for rows in &columns {
@@ -66,23 +68,6 @@ impl Hessian {
             lift: vec![Vector3::zeros(); n_nodes],
             has_motion: false,
         }
-    }
-
-    /// Second derivatives of the sum of `energies` at `x: [n_nodes]` \[m\], on the coordinates that are free.
-    ///
-    /// # Panics
-    /// If the lengths of `x` and `constraints` differ.
-    pub fn assemble(
-        energies: &[&dyn Energy],
-        constraints: &Constraints,
-        x: &[Vector3<f64>],
-        projection: Projection,
-    ) -> Self {
-        assert_eq!(x.len(), constraints.n_nodes(), "nodes");
-        let mut hessian = Self::new(constraints, energies);
-        energies.iter().for_each(|energy| energy.add_hessian(x, projection, &mut hessian));
-        hessian.finish(0.0);
-        hessian
     }
 
     /// `H v` for vectors at the nodes; 0 at given coordinates, and those of `v` count as 0.
@@ -290,20 +275,18 @@ impl Hessian {
 }
 
 /// Block rows of each block column, at and below the diagonal, increasing.
-fn pattern(block_of_node: &[u32], n_blocks: usize, energies: &[&dyn Energy]) -> Vec<Vec<u32>> {
+fn pattern(block_of_node: &[u32], n_blocks: usize, visit_stencils: &VisitStencils<'_>) -> Vec<Vec<u32>> {
     let mut columns: Vec<Vec<u32>> = (0..n_blocks as u32).map(|b| vec![b]).collect();
-    for energy in energies {
-        energy.visit_stencils(&mut |nodes| {
-            for a in nodes {
-                for b in nodes {
-                    let (i, j) = (block_of_node[a.index()], block_of_node[b.index()]);
-                    if i != GIVEN && j != GIVEN && i > j {
-                        columns[j as usize].push(i);
-                    }
+    visit_stencils(&mut |nodes| {
+        for a in nodes {
+            for b in nodes {
+                let (i, j) = (block_of_node[a.index()], block_of_node[b.index()]);
+                if i != GIVEN && j != GIVEN && i > j {
+                    columns[j as usize].push(i);
                 }
             }
-        });
-    }
+        }
+    });
     for rows in &mut columns {
         rows.sort_unstable();
         rows.dedup();

@@ -1,12 +1,13 @@
 //! The accurate model of Plica: quasi-static equilibria of non-linear solids, found by Newton's method on a sum of energies.
 //!
 //! [`Energy`] is the one trait: value, gradient and Hessian on a fixed sparsity. [`Solver`] holds the symbolic factorisation
-//! and minimises a sum of energies under [`Constraints`]. What is minimised is put together by the caller: a [`Solid`], loads,
+//! and minimises a sum of energies under [`Constraints`]. The caller chooses the energies: a [`Solid`], loads,
 //! a [`Tie`] to a coarse imprint, or contact with a tool.
 //!
-//! Arithmetic is `f64` in SI units. This crate knows no bus, no thread and no clock; a callback is told of progress and may
+//! Arithmetic is `f64` in SI units. This crate knows no bus, no thread and no clock; a callback receives progress and may
 //! cancel. The same input gives the same bits.
 
+mod assembly;
 mod constraints;
 pub mod contact;
 mod energy;

@@ -57,13 +57,13 @@ pub enum MaterialError {
     /// Young's modulus is not positive and finite.
     #[error("Young's modulus is {young_modulus_pa} Pa, it must be positive and finite")]
     YoungModulus {
-        /// What was given \[Pa\].
+        /// Value \[Pa\].
         young_modulus_pa: f64,
     },
     /// Poisson's ratio is out of range.
     #[error("Poisson's ratio is {poisson_ratio}, it must lie between -1 and 0.5, both excluded")]
     PoissonRatio {
-        /// What was given.
+        /// Value.
         poisson_ratio: f64,
     },
 }
@@ -147,7 +147,7 @@ impl Law {
         Self { model: material.model, lambda: lambda_pa, mu: mu_pa }
     }
 
-    /// What the volumetric part depends on: `tr(F) - 3` of the linear material, `J - 1` of the others.
+    /// Argument of the volumetric part: `tr(F) - 3` of the linear material, `J - 1` of the others.
     pub(crate) fn dilatation(&self, deformation: &Deformation) -> f64 {
         match self.model {
             MaterialModel::Linear => deformation.gradient.trace(),

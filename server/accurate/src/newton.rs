@@ -1,21 +1,22 @@
 //! Newton's method with a line search on a sum of energies.
 
-mod acceptance;
 mod direction;
-mod follower;
+mod gmres;
 mod line_search;
 mod report;
+mod sufficient_decrease;
 
 use std::ops::ControlFlow;
 
 use nalgebra::Vector3;
 
+use crate::assembly::empty_hessian;
 use crate::constraints::Constraints;
 use crate::energy::Energy;
 use crate::factor::{Factor, FactorError};
 use crate::hessian::Hessian;
-use acceptance::Total;
 pub use report::{Info, Params, Progress, SolveError};
+use sufficient_decrease::Total;
 
 /// Forces below this share of stiffness times position are rounding.
 const FORCE_ROUNDING: f64 = 256.0 * f64::EPSILON;
@@ -34,7 +35,7 @@ pub struct Solver {
     stiffness: f64,
 }
 
-/// What is minimised, where, and how far.
+/// Minimisation problem: energies, constraints and stopping criteria.
 #[derive(Clone, Copy)]
 struct Problem<'a> {
     energies: &'a [&'a dyn Energy],
@@ -48,12 +49,14 @@ impl Problem<'_> {
     }
 }
 
+/// Forces out of balance, `g = sum_e g_e` at free coordinates, with the gradients `g_e` of single energies.
 #[derive(Debug, Clone, Copy)]
 struct Residual {
-    /// Largest force at a free node over the largest nodal force of a single energy. Where forces are mere rounding, as
-    /// after a rigid motion, they count as within the tolerance.
+    /// `max_n |g_n| / max(max_e,n |g_e,n|, F / tolerance)`, 0 for `g = 0`. Forces below the rounding
+    /// `F = 256 eps k max_n |x_n|`, with the mean diagonal `k` of the last Hessian, are so within the tolerance, as after a
+    /// rigid motion.
     relative: f64,
-    /// Norm of the force at free coordinates \[N\].
+    /// `|g|` \[N\].
     norm: f64,
 }
 
@@ -64,7 +67,7 @@ impl Solver {
     /// # Errors
     /// [`FactorError`]: no memory.
     pub fn new(constraints: &Constraints, energies: &[&dyn Energy]) -> Result<Self, FactorError> {
-        let hessian = Hessian::new(constraints, energies);
+        let hessian = empty_hessian(constraints, energies);
         let factor = Factor::new(&hessian, energies.iter().find_map(|e| e.rest_positions()))?;
         let zeros = || vec![Vector3::zeros(); constraints.n_nodes()];
         Ok(Self {
@@ -80,7 +83,7 @@ impl Solver {
         })
     }
 
-    /// Free unknowns, and values of the Cholesky factor: what a solve costs.
+    /// Number of free unknowns, and of values in the Cholesky factor.
     pub fn size(&self) -> (usize, usize) {
         (self.hessian.n_unknowns(), self.factor.n_values())
     }
@@ -124,6 +127,22 @@ impl Solver {
         Ok(info)
     }
 
+    /// Residual at `x` as in [`Info::residuals`], for a solve to `tolerance`.
+    ///
+    /// # Panics
+    /// If the lengths of `x` and `constraints` are not those of the analysis.
+    pub(crate) fn residual(
+        &mut self,
+        energies: &[&dyn Energy],
+        constraints: &Constraints,
+        tolerance: f64,
+        x: &[Vector3<f64>],
+    ) -> f64 {
+        assert_eq!((x.len(), constraints.n_nodes()), (self.gradient.len(), self.gradient.len()), "nodes");
+        let params = &Params { tolerance, ..Params::default() };
+        self.find_residual(&Problem { energies, constraints, params }, x).relative
+    }
+
     /// One Newton step. While given coordinates still move, the free ones follow linearly whatever the energy says.
     fn step(
         &mut self,
@@ -140,7 +159,7 @@ impl Solver {
         went.then_some(()).ok_or(SolveError::LineSearch { iterations, residual })
     }
 
-    /// What given coordinates still have to move; whether any has.
+    /// Finds the remaining motion of given coordinates; returns whether any is left.
     fn find_motion(&mut self, constraints: &Constraints, x: &[Vector3<f64>]) -> bool {
         let mut moves = false;
         for (node, motion) in self.motion.iter_mut().enumerate() {

@@ -23,7 +23,7 @@ pub(crate) fn nested_dissection(positions: &[Vector3<f64>], neighbours: &[Vec<u3
 struct Dissection<'a> {
     positions: &'a [Vector3<f64>],
     neighbours: &'a [Vec<u32>],
-    /// `mark[n] == n_marks` for nodes beyond the plane that is being looked at.
+    /// `mark[n] == n_marks` for nodes beyond the current plane.
     mark: Vec<usize>,
     n_marks: usize,
     order: Vec<usize>,

@@ -1,4 +1,4 @@
-//! Forces that supports exert.
+//! Reaction forces of supports.
 
 use nalgebra::Vector3;
 

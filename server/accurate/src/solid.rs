@@ -52,7 +52,7 @@ pub enum SolidError {
     Material {
         /// Its first hexahedron.
         hex: HexIdx,
-        /// What is wrong.
+        /// Cause.
         error: MaterialError,
     },
 }

@@ -9,7 +9,7 @@ use crate::hessian::Hessian;
 /// Version of the tie's definition: solutions depend on it, so databases name it.
 pub const TIE_VERSION: u32 = 1;
 
-/// How stiff a tie is.
+/// Stiffness of a tie.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TieOptions {
     /// Young's modulus of the tied material \[Pa\].
@@ -23,7 +23,7 @@ pub struct TieOptions {
 }
 
 impl TieOptions {
-    /// What the scenes use, for a material of the given Young's modulus \[Pa\].
+    /// Defaults of the scenes, for a material with the given Young's modulus \[Pa\].
     pub fn for_modulus(young_modulus_pa: f64) -> Self {
         Self { young_modulus_pa, compliance_m: 2e-5, band_m: 1e-3, rim_floor: 1e-4 }
     }
@@ -43,7 +43,7 @@ impl TieOptions {
     }
 }
 
-/// Where a surface vertex shall be.
+/// Target position of a surface vertex.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TieTarget {
     /// The vertex: a row of the embedding.

@@ -9,7 +9,8 @@ use common::random::Random;
 use common::{distorted_block, rest};
 use nalgebra::{Isometry3, Point3, Vector3};
 use plica_accurate::Energy;
-use plica_accurate::contact::{ContactSurface, Friction, FrictionRow, NormalContact, Obstacle, Polytope};
+use plica_accurate::contact::{ContactSurface, Friction, FrictionRow, NormalContact, Obstacle};
+use plica_geometry::ConvexPolytope;
 
 const CELL: f64 = 0.01;
 const PENALTY: f64 = 1e8;
@@ -34,7 +35,7 @@ fn pressures() {
         Obstacle::Ball { radius_m: 9e-3 },
         Obstacle::Capsule { radius_m: 8e-3, length_m: 0.03 },
         Obstacle::HalfSpace,
-        Obstacle::Polytope(Polytope::cuboid([0.012, 0.01, 0.005]).unwrap()),
+        Obstacle::Polytope(ConvexPolytope::cuboid([0.012, 0.01, 0.005]).unwrap()),
     ];
     for (n, obstacle) in obstacles.iter().enumerate() {
         let mut scene = scene(n as u64);

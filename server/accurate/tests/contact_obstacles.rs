@@ -6,15 +6,16 @@ mod common;
 
 use common::random::Random;
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
-use plica_accurate::contact::{Obstacle, Polytope, PolytopeError};
+use plica_accurate::contact::Obstacle;
+use plica_geometry::ConvexPolytope;
 
 const STEP_M: f64 = 1e-7;
 
 fn shapes() -> Vec<(&'static str, Obstacle)> {
     let ball = Obstacle::Ball { radius_m: 7e-3 };
     let capsule = Obstacle::Capsule { radius_m: 3e-3, length_m: 0.02 };
-    let cuboid = Obstacle::Polytope(Polytope::cuboid([4e-3, 5e-3, 6e-3]).unwrap());
-    let hull = Obstacle::Polytope(Polytope::hull(&tetrahedron()).unwrap());
+    let cuboid = Obstacle::Polytope(ConvexPolytope::cuboid([4e-3, 5e-3, 6e-3]).unwrap());
+    let hull = Obstacle::Polytope(ConvexPolytope::hull(tetrahedron().to_vec()).unwrap());
     let union = Obstacle::Union(vec![Obstacle::Ball { radius_m: 2e-3 }, capsule.clone(), cuboid.clone()]);
     vec![
         ("ball", ball),
@@ -74,7 +75,7 @@ fn shapes_lie_as_those_of_the_simulation() {
     near(distance(&capsule, 3.0, 0.0, 2.0), 2.0);
     near(distance(&capsule, 0.0, 0.0, 7.0), 1.0);
     near(distance(&Obstacle::HalfSpace, 4.0, 5.0, 2.0), 2.0);
-    let cuboid = Obstacle::Polytope(Polytope::cuboid([1.0, 2.0, 3.0]).unwrap());
+    let cuboid = Obstacle::Polytope(ConvexPolytope::cuboid([1.0, 2.0, 3.0]).unwrap());
     near(distance(&cuboid, 0.0, 0.0, -4.0), 1.0);
     near(distance(&cuboid, 0.0, 1.5, 0.0), -0.5);
     near(distance(&Obstacle::Union(vec![capsule, cuboid]), 0.0, 1.9, 0.0), -0.1);
@@ -91,36 +92,4 @@ fn centres_have_a_normal() {
     let axis =
         Obstacle::Capsule { radius_m: 1.0, length_m: 5.0 }.gap(&Isometry3::identity(), &Point3::new(0.0, 0.0, 2.0));
     assert_eq!((axis.distance_m, axis.normal.z), (-1.0, 0.0));
-}
-
-#[test]
-fn hulls_have_the_faces_of_their_points() {
-    let tetrahedron = Polytope::hull(&tetrahedron()).unwrap();
-    assert_eq!(tetrahedron.planes().len(), 4);
-    let half = [4e-3, 5e-3, 6e-3];
-    let sign = |i: usize, axis: usize| if i >> axis & 1 == 0 { -half[axis] } else { half[axis] };
-    let corners: Vec<_> = (0..8).map(|i| Point3::new(sign(i, 0), sign(i, 1), sign(i, 2))).collect();
-    let (hull, cuboid) = (Polytope::hull(&corners).unwrap(), Polytope::cuboid(half).unwrap());
-    assert_eq!(hull.planes().len(), 6);
-    let mut random = Random::new(6);
-    for _ in 0..100 {
-        let point = Point3::from(random.vector(0.01));
-        assert!((hull.distance(&point).0 - cuboid.distance(&point).0).abs() < 1e-12);
-    }
-    // A ball of points: all of them on the hull, none outside.
-    let sphere: Vec<_> = (0..150).map(|_| Point3::from(random.vector(1.0).normalize() * 0.01)).collect();
-    let hull = Polytope::hull(&sphere).unwrap();
-    assert!(sphere.iter().all(|p| hull.distance(p).0.abs() < 1e-10));
-    assert_eq!(hull.planes().len(), 2 * sphere.len() - 4, "Euler's formula for triangles");
-}
-
-#[test]
-fn what_is_no_polytope_is_refused() {
-    let flat = [Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0), Point3::new(1.0, 1.0, 0.0)];
-    assert_eq!(Polytope::hull(&flat), Err(PolytopeError::Flat { n_points: 4 }));
-    assert_eq!(Polytope::hull(&[]), Err(PolytopeError::Flat { n_points: 0 }));
-    assert_eq!(Polytope::new(&[]), Err(PolytopeError::Planes { n_planes: 0, first_unusable: 0 }));
-    let planes = [(Vector3::z(), Point3::origin()), (Vector3::zeros(), Point3::origin())];
-    assert_eq!(Polytope::new(&planes), Err(PolytopeError::Planes { n_planes: 2, first_unusable: 1 }));
-    assert!(Polytope::cuboid([1.0, f64::NAN, 1.0]).is_err());
 }

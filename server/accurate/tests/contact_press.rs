@@ -8,7 +8,8 @@ use std::ops::ControlFlow;
 
 use contact::{BLOCK_M, Body, Tool, at, soft_block};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use plica_accurate::contact::{ContactError, ContactInfo, ContactState, Obstacle, Polytope};
+use plica_accurate::contact::{ContactError, ContactInfo, ContactState, Obstacle};
+use plica_geometry::ConvexPolytope;
 
 const TOP_M: f64 = BLOCK_M[2];
 /// The middle of the top, off any symmetry of the mesh.
@@ -23,12 +24,12 @@ fn over(lowest_m: f64, height_m: f64, along_m: f64) -> Isometry3<f64> {
 fn tools(friction: f64) -> Vec<(&'static str, Tool, f64)> {
     let cuboid = [8e-3, 6e-3, 5e-3];
     let tip = [[0.0, 0.0, -9e-3], [9e-3, 0.0, 2e-3], [-6e-3, 8e-3, 2e-3], [-6e-3, -8e-3, 2e-3]].map(Into::into);
-    let twins = |side: f64| Obstacle::Polytope(Polytope::hull(&cuboid_corners(side)).unwrap());
+    let twins = |side: f64| Obstacle::Polytope(ConvexPolytope::hull(cuboid_corners(side)).unwrap());
     vec![
         ("ball", Tool::ball(7e-3, friction), 7e-3),
         ("capsule", Tool::capsule(friction), 7e-3),
         ("cuboid", Tool::cuboid(cuboid, friction), 5e-3),
-        ("pyramid", Tool::new(Obstacle::Polytope(Polytope::hull(&tip).unwrap()), friction), 9e-3),
+        ("pyramid", Tool::new(Obstacle::Polytope(ConvexPolytope::hull(tip.to_vec()).unwrap()), friction), 9e-3),
         ("two feet", Tool::new(Obstacle::Union(vec![twins(-1.0), twins(1.0)]), friction), 5e-3),
     ]
 }

@@ -62,7 +62,7 @@ pub enum EmbeddingError {
     /// The support is not a positive finite number.
     #[error("the support of moving least squares is {support_cells} cells, it must be positive and finite")]
     Support {
-        /// What was asked for.
+        /// Value.
         support_cells: f64,
     },
 }

@@ -67,7 +67,7 @@ impl<'a> ExponentialMaps<'a> {
     }
 }
 
-/// What has been reached so far.
+/// Vertices reached so far.
 struct Front<'a, A> {
     maps: &'a ExponentialMaps<'a>,
     source: usize,

@@ -16,7 +16,7 @@ pub enum ExportError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Cause.
         source: std::io::Error,
     },
     /// A field does not hold one value per node or hexahedron.

@@ -63,7 +63,7 @@ pub enum MeshError {
         corner: usize,
         /// `det J` there \[m^3\].
         determinant: f64,
-        /// What it must exceed \[m^3\].
+        /// Lower bound \[m^3\].
         limit: f64,
     },
     /// A node belongs to no hexahedron.

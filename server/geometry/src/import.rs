@@ -19,7 +19,7 @@ pub use obj::read_obj_parts;
 
 use error::{Fault, fault};
 
-/// A mesh and what its file calls parts of it.
+/// Mesh with the named groups of its file.
 #[derive(Clone, Debug)]
 pub struct NamedMesh {
     /// Nodes \[m\] and hexahedra, in the order of the file; nodes that no hexahedron uses are left out.

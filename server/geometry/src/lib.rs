@@ -1,10 +1,11 @@
-//! Meshes of Plica and what depends on nothing but them: hexahedral meshes, the generated shapes of the
-//! scenes, triangle skins and their clusters, embedding weights, mesh files.
+//! Geometry of Plica: hexahedral meshes, generated shapes of the scenes, triangle skins and their clusters, convex
+//! polytopes, embedding weights, mesh files.
 //!
 //! Everything is `f64` in SI units (metres), right-handed, z up. This crate knows no physics, no bus and no clock.
 
 mod box_tree;
 mod clusters;
+mod convex_polytope;
 mod display_surface;
 mod embedding;
 mod exponential_map;
@@ -22,6 +23,7 @@ pub mod shapes;
 mod skin;
 
 pub use clusters::CLUSTER_SIZE;
+pub use convex_polytope::{ConvexPolytope, FaceDistance, FacePlane, HullError};
 pub use display_surface::{DisplaySurface, vertex_normals_into};
 pub use embedding::{DEFAULT_SUPPORT_CELLS, Embedding, EmbeddingError, EmbeddingKind, MAX_OUTSIDE_CELLS};
 pub use exponential_map::{ExponentialMaps, Mapped};

@@ -20,13 +20,13 @@ pub struct Predicate {
     condition: Expression,
 }
 
-/// What is wrong with the text of a condition.
+/// Syntax error in the text of a condition.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("column {column}: {problem}")]
 pub struct PredicateError {
     /// One-based column, in characters.
     pub column: usize,
-    /// What is wrong there.
+    /// Cause.
     pub problem: String,
 }
 

@@ -10,7 +10,7 @@ const DEGENERATE: f64 = 0.1;
 /// A hit nearer than this to where the ray starts is the start itself \[m\].
 const START: f64 = 1e-6;
 
-/// The skin at rest with what is asked of it often.
+/// Skin at rest with precomputed tables.
 #[derive(Debug, Clone)]
 pub struct ReferenceSkin {
     skin: Skin,

@@ -102,8 +102,8 @@ fn tool(config: &Config, tool: &ToolDescription) -> Result<Value, HashError> {
         ToolShape::Capsule { radius_m, length_m } => json!({ "capsule": [radius_m, length_m] }),
         // Halves of what was typed: exact.
         ToolShape::Cuboid { half_extents_m } => json!({ "cuboid": half_extents_m }),
-        ToolShape::ConvexHull { points_m } => {
-            json!({ "hull": points_m.iter().map(|p| p.coords.as_slice().to_vec()).collect::<Vec<_>>() })
+        ToolShape::ConvexHull { polytope } => {
+            json!({ "hull": polytope.points().iter().map(|p| p.coords.as_slice().to_vec()).collect::<Vec<_>>() })
         }
         ToolShape::Compound { .. } => mesh_file(config, &tool.name)?,
     };

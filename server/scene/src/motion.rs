@@ -128,8 +128,8 @@ pub fn tip_radius_m(tool: &ToolDescription) -> f64 {
     match &tool.shape {
         ToolShape::Ball { radius_m } | ToolShape::Capsule { radius_m, .. } => *radius_m,
         ToolShape::Cuboid { half_extents_m } => half_extents_m[2],
-        ToolShape::ConvexHull { points_m } => lowest(&mut points_m.iter().map(|p| p.z)),
-        ToolShape::Compound { hulls_m } => lowest(&mut hulls_m.iter().flatten().map(|p| p.z)),
+        ToolShape::ConvexHull { polytope } => lowest(&mut polytope.points().iter().map(|p| p.z)),
+        ToolShape::Compound { polytopes } => lowest(&mut polytopes.iter().flat_map(|p| p.points()).map(|p| p.z)),
     }
 }
 

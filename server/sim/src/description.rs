@@ -1,7 +1,9 @@
 //! A scene as plain data: what a [`Model`](crate::Model) is built from. SI units; right-handed, z up.
 
+use std::borrow::Cow;
+
 use nalgebra::{Isometry3, Point3, Vector3};
-use plica_geometry::{Embedding, HexMesh, Skin};
+use plica_geometry::{ConvexPolytope, Embedding, HexMesh, HullError, Skin};
 
 /// Everything that is fixed while a scene runs.
 #[derive(Debug, Clone)]
@@ -187,14 +189,29 @@ pub enum ToolShape {
     },
     /// Convex hull of points.
     ConvexHull {
-        /// Points \[m\], at least four that do not lie in a plane.
-        points_m: Vec<Point3<f64>>,
+        /// The hull \[m\].
+        polytope: ConvexPolytope,
     },
     /// Union of convex hulls (a mesh file, decomposed).
     Compound {
-        /// Points of each hull \[m\].
-        hulls_m: Vec<Vec<Point3<f64>>>,
+        /// Hull of each part \[m\].
+        polytopes: Vec<ConvexPolytope>,
     },
+}
+
+impl ToolShape {
+    /// Convex polytopes whose union is the shape; none for a round shape.
+    ///
+    /// # Errors
+    /// [`HullError`]: a cuboid without a volume.
+    pub fn polytopes(&self) -> Result<Cow<'_, [ConvexPolytope]>, HullError> {
+        Ok(match self {
+            Self::Ball { .. } | Self::Capsule { .. } => Cow::Borrowed(&[]),
+            Self::Cuboid { half_extents_m } => Cow::Owned(vec![ConvexPolytope::cuboid(*half_extents_m)?]),
+            Self::ConvexHull { polytope } => Cow::Borrowed(std::slice::from_ref(polytope)),
+            Self::Compound { polytopes } => Cow::Borrowed(polytopes),
+        })
+    }
 }
 
 /// How the simulated proxy follows the device.

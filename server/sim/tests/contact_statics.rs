@@ -5,6 +5,7 @@ mod common;
 
 use common::*;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use plica_geometry::ConvexPolytope;
 use plica_sim::*;
 
 /// Contact of the wedge's top face at `x`, and the pose of a ball pressed `depth` into it.
@@ -88,7 +89,7 @@ fn flat_faces_and_edges_settle_on_the_triangles() {
         |i: usize| Point3::from(std::array::from_fn::<f64, 3, _>(|k| if i >> k & 1 == 0 { -half[k] } else { half[k] }));
     let shapes = [
         ("cuboid", ToolShape::Cuboid { half_extents_m: half }),
-        ("hull", ToolShape::ConvexHull { points_m: (0..8).map(corner).collect() }),
+        ("hull", ToolShape::ConvexHull { polytope: ConvexPolytope::hull((0..8).map(corner).collect()).unwrap() }),
     ];
     for (name, shape) in shapes {
         for (how, tilt, reach) in [("flat", 0.0, 0.008), ("edge", 45.0_f64.to_radians(), 0.008 * 2.0_f64.sqrt())] {

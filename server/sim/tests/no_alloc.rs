@@ -8,6 +8,7 @@ use std::sync::Arc;
 use assert_no_alloc::{AllocDisabler, assert_no_alloc, violation_count};
 use common::{E, Run, Scene, at, ball, tool, top, top_normal, turned};
 use nalgebra::{Isometry3, Point3, Vector3};
+use plica_geometry::ConvexPolytope;
 use plica_sim::enrichment::{Enricher, EnrichmentOptions, Examples, LiveEnrichment, Touch};
 use plica_sim::*;
 
@@ -48,7 +49,12 @@ fn crowded(sleep: bool) -> Run {
         .tool(with(ball(0.008), 0.5, spring, Sampling::Latest))
         .tool(with(tool("capsule", capsule), 0.8, spring, late))
         .tool(with(tool("cuboid", cuboid), 0.3, Coupling::Rigid, Sampling::Latest))
-        .tool(with(tool("hull", ToolShape::ConvexHull { points_m }), 0.0, Coupling::Rigid, late))
+        .tool(with(
+            tool("hull", ToolShape::ConvexHull { polytope: ConvexPolytope::hull(points_m).unwrap() }),
+            0.0,
+            Coupling::Rigid,
+            late,
+        ))
         .with(|d| {
             d.planes.push(Plane { point_m: Point3::new(0.0, 0.0, 0.0385), normal: Vector3::new(1.0, 0.0, -3.0) });
             d.gravity_m_per_s2 = Vector3::new(0.0, 0.0, -1.0);

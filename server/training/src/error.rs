@@ -3,9 +3,8 @@
 use std::io::ErrorKind;
 use std::path::PathBuf;
 
-use plica_accurate::contact::PolytopeError;
 use plica_accurate::{SolidError, SolveError};
-use plica_geometry::EmbeddingError;
+use plica_geometry::{EmbeddingError, HullError};
 use plica_sim::ModelError;
 
 /// Exit code of a process whose job was interrupted: finished examples are kept.
@@ -59,7 +58,7 @@ pub enum BuildError {
         /// The tool.
         tool: String,
         /// Why.
-        source: PolytopeError,
+        source: HullError,
     },
     /// Something that the accurate model cannot do yet.
     #[error("the accurate model knows no {what}; remove them from the scene to train on it")]

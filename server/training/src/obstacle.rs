@@ -1,28 +1,34 @@
 //! The tools of the simulation as obstacles of the accurate model: signed distances in `f64`.
 
 use nalgebra::{Isometry3, Point3, Vector3};
-use plica_accurate::contact::{Obstacle, Polytope, PolytopeError};
+use plica_accurate::contact::Obstacle;
+use plica_geometry::{ConvexPolytope, HullError};
 use plica_sim::ToolShape;
 
 /// Closer than this is touching \[m\].
 const TOUCH_M: f64 = 1e-7;
 const MAX_STEPS: usize = 200;
 
-/// The same shape with exact distances.
+/// Obstacle of the same shape, with distances in `f64`.
 ///
 /// # Errors
-/// The points of a hull span no volume.
-pub(crate) fn obstacle(shape: &ToolShape) -> Result<Obstacle, PolytopeError> {
+/// [`HullError`]: a cuboid without a volume.
+pub(crate) fn obstacle(shape: &ToolShape) -> Result<Obstacle, HullError> {
     Ok(match shape {
         ToolShape::Ball { radius_m } => Obstacle::Ball { radius_m: *radius_m },
         ToolShape::Capsule { radius_m, length_m } => Obstacle::Capsule { radius_m: *radius_m, length_m: *length_m },
-        ToolShape::Cuboid { half_extents_m } => Obstacle::Polytope(Polytope::cuboid(*half_extents_m)?),
-        ToolShape::ConvexHull { points_m } => Obstacle::Polytope(Polytope::hull(points_m)?),
-        ToolShape::Compound { hulls_m } => {
-            let parts = hulls_m.iter().map(|hull| Polytope::hull(hull).map(Obstacle::Polytope));
-            Obstacle::Union(parts.collect::<Result<_, _>>()?)
+        ToolShape::Cuboid { .. } | ToolShape::ConvexHull { .. } | ToolShape::Compound { .. } => {
+            union(shape.polytopes()?.into_owned())
         }
     })
+}
+
+fn union(mut parts: Vec<ConvexPolytope>) -> Obstacle {
+    if parts.len() == 1 {
+        Obstacle::Polytope(parts.remove(0))
+    } else {
+        Obstacle::Union(parts.into_iter().map(Obstacle::Polytope).collect())
+    }
 }
 
 /// Radius of the disc that a tool covers: its own, or half of the smaller lateral extent \[m\].
@@ -37,8 +43,8 @@ pub(crate) fn radius_m(shape: &ToolShape) -> f64 {
     match shape {
         ToolShape::Ball { radius_m } | ToolShape::Capsule { radius_m, .. } => *radius_m,
         ToolShape::Cuboid { half_extents_m } => half_extents_m[0].min(half_extents_m[1]),
-        ToolShape::ConvexHull { points_m } => lateral(&mut points_m.iter()),
-        ToolShape::Compound { hulls_m } => lateral(&mut hulls_m.iter().flatten()),
+        ToolShape::ConvexHull { polytope } => lateral(&mut polytope.points().iter()),
+        ToolShape::Compound { polytopes } => lateral(&mut polytopes.iter().flat_map(|p| p.points())),
     }
 }
 
@@ -97,7 +103,8 @@ mod tests {
             .iter()
             .map(|(x, y, z)| Point3::new(*x, *y, *z))
             .collect();
-        assert_eq!(radius_m(&ToolShape::ConvexHull { points_m: hull }), 0.002);
+        let polytope = ConvexPolytope::hull(hull).unwrap();
+        assert_eq!(radius_m(&ToolShape::ConvexHull { polytope }), 0.002);
         assert_eq!(radius_m(&ToolShape::Cuboid { half_extents_m: [0.01, 0.003, 0.02] }), 0.003);
     }
 }

@@ -1,4 +1,4 @@
-//! What holds points against sliding along an obstacle: an augmented Lagrangian of the tangential traction.
+//! Friction along an obstacle: an augmented Lagrangian of the tangential traction.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use plica_geometry::NodeIdx;
@@ -7,7 +7,7 @@ use super::surface::{ContactPoint, ContactSurface};
 use crate::energy::{Energy, Projection};
 use crate::hessian::Hessian;
 
-/// Friction of one contact point: what is held fixed while positions are solved for.
+/// Friction of one contact point, constant during a solve for positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionRow {
     /// `a`: where the point would be if it had not slid \[m\].

@@ -6,17 +6,16 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::friction::{Friction, FrictionRow};
 use super::normal::NormalContact;
-use super::outcome::ContactInfo;
 use super::params::ContactParams;
 use super::press::Press;
+use super::result::{ContactError, ContactInfo};
 use super::state::ContactState;
-use crate::constraints::Constraints;
 use crate::energy::Energy;
 use crate::newton::{Info, Params, Progress, SolveError, Solver};
 
-/// Share of the forces out of balance that is left for the next multipliers: about one Newton step.
+/// Residual of a solve between two updates, as a share of the first: about one Newton step.
 const LEFT_TO_NEXT: f64 = 0.3;
-/// How much larger the tolerances of pressures and of forces are in increments that do not end at a pose of the path.
+/// Factors on the tolerances of pressures and forces in increments that end between two waypoints.
 const ON_THE_WAY: [f64; 2] = [3.0, 100.0];
 
 /// An increment under way.
@@ -35,10 +34,10 @@ pub(super) struct Increment<'a> {
     rows: Vec<FrictionRow>,
 }
 
-/// How well pressures fit positions.
+/// Convergence of pressures and positions.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Fit {
-    /// What the last solve changed of the pressures' continuous part, as a share of the largest pressure.
+    /// Change of the pressures' continuous part in the last solve, as a share of the largest pressure.
     pub(super) pressure_change: f64,
     /// The same of tractions.
     pub(super) traction_change: f64,
@@ -47,16 +46,36 @@ pub(super) struct Fit {
     pub(super) smallest_jacobian: Option<f64>,
 }
 
-/// Why an increment has no result.
+/// Failure of an increment.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Failure {
     Solve(SolveError),
-    /// Pressures still moved after the last update.
+    /// Pressures not settled after the last update.
     Unsettled(Fit),
 }
 
+impl Failure {
+    /// The error, unless the increment may be halved once more.
+    pub(super) fn give_up(self, share: f64, halvings: u32, params: &ContactParams) -> Result<(), ContactError> {
+        let may_help = halvings < params.max_halvings;
+        match self {
+            Self::Solve(SolveError::Cancelled { .. }) => Err(ContactError::Cancelled { share }),
+            Self::Solve(source @ SolveError::Factor(_)) => Err(ContactError::Solve { share, halvings, source }),
+            _ if may_help => Ok(()),
+            Self::Solve(source) => Err(ContactError::Solve { share, halvings, source }),
+            Self::Unsettled(fit) => Err(ContactError::Unsettled {
+                share,
+                halvings,
+                pressure_change: fit.pressure_change,
+                traction_change: fit.traction_change,
+                max_updates: params.max_updates,
+            }),
+        }
+    }
+}
+
 impl<'a> Increment<'a> {
-    /// Of the tool's motion to `pose`, one of the path's or on the way to one, from where it is in `state`.
+    /// From the tool pose in `state` to `pose`, a waypoint or a point between two.
     pub(super) fn new(press: &'a Press<'a>, state: &ContactState, pose: &Isometry3<f64>, is_on_the_way: bool) -> Self {
         let ContactParams { young_modulus_pa, penalty_ratio, friction_penalty_ratio, .. } = press.params;
         let [looser_pressures, looser_forces] = if is_on_the_way { ON_THE_WAY } else { [1.0; 2] };
@@ -139,8 +158,8 @@ impl<'a> Increment<'a> {
         }
     }
 
-    /// Solves with given multipliers until the residual is below `tolerance` of what it is at first, and not below the
-    /// press's own.
+    /// Solves with given multipliers to `tolerance` of the first residual, or to the increment's own tolerance if that is
+    /// larger.
     fn find_positions(
         &self,
         solver: &mut Solver,
@@ -154,7 +173,9 @@ impl<'a> Increment<'a> {
         let friction = Friction { surface, rows: &self.rows, penalties_pa_per_m: &self.friction_penalties };
         let mut energies: Vec<&dyn Energy> = self.press.energies.to_vec();
         energies.extend([&normal as &dyn Energy, &friction]);
-        let tolerance = tolerance(residual(&energies, constraints, x)).max(self.newton_tolerance);
+        // To a tolerance of 1, so that forces count as rounding only where they are.
+        let first = solver.residual(&energies, constraints, 1.0, x);
+        let tolerance = tolerance(first).max(self.newton_tolerance);
         let newton = Params { tolerance, max_iterations: params.max_newton_iterations };
         let mut steps = 0;
         let mut count = |progress: Progress| {
@@ -198,22 +219,4 @@ impl<'a> Increment<'a> {
         (self.pressures, self.tractions) = (pressures, tractions);
         fit
     }
-}
-
-/// Largest force at a free coordinate, as a share of the largest nodal force of any single energy.
-fn residual(energies: &[&dyn Energy], constraints: &Constraints, x: &[Vector3<f64>]) -> f64 {
-    let zeros = || vec![Vector3::zeros(); x.len()];
-    let (mut sum, mut largest) = (zeros(), 0.0_f64);
-    for energy in energies {
-        let mut single = zeros();
-        energy.add_gradient(x, &mut single);
-        largest = single.iter().map(Vector3::norm).fold(largest, f64::max);
-        sum.iter_mut().zip(single).for_each(|(sum, force): (&mut Vector3<f64>, _)| *sum += force);
-    }
-    let free = |(node, force): (usize, &Vector3<f64>)| {
-        let given = constraints.is_given(node);
-        Vector3::from_fn(|k, _| if given[k] { 0.0 } else { force[k] }).norm()
-    };
-    let left = sum.iter().enumerate().map(free).fold(0.0, f64::max);
-    if left == 0.0 { 0.0 } else { left / largest }
 }

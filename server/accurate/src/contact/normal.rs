@@ -1,4 +1,4 @@
-//! What keeps points outside of an obstacle: an augmented Lagrangian of the pressure.
+//! Normal contact with an obstacle: an augmented Lagrangian of the pressure.
 
 use nalgebra::{Isometry3, Vector3};
 use plica_geometry::NodeIdx;
@@ -14,9 +14,9 @@ use crate::hessian::Hessian;
 pub struct NormalContact<'a> {
     /// Points.
     pub surface: &'a ContactSurface,
-    /// What they touch.
+    /// Obstacle of the points.
     pub obstacle: &'a Obstacle,
-    /// Where that is.
+    /// `world <- obstacle`.
     pub pose: &'a Isometry3<f64>,
     /// `l`, `[n_points]` \[Pa\].
     pub multipliers_pa: &'a [f64],

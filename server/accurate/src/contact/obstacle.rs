@@ -1,8 +1,7 @@
 //! Rigid shapes as signed distances: gap, outward normal and curvature.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
-
-use super::polytope::Polytope;
+use plica_geometry::ConvexPolytope;
 
 /// Below this distance from a centre or an axis the direction away from it is rounding \[m\].
 const SMALLEST_DISTANCE_M: f64 = 1e-12;
@@ -24,8 +23,8 @@ pub enum Obstacle {
     },
     /// All points with `z <= 0`.
     HalfSpace,
-    /// Intersection of half-spaces.
-    Polytope(Polytope),
+    /// Convex polytope.
+    Polytope(ConvexPolytope),
     /// All points of any part; their smallest signed distance counts.
     Union(Vec<Obstacle>),
 }
@@ -61,8 +60,8 @@ impl Obstacle {
             Self::Capsule { radius_m, length_m } => capsule(point, *radius_m, *length_m),
             Self::HalfSpace => flat(point.z, Vector3::z()),
             Self::Polytope(polytope) => {
-                let (distance, normal) = polytope.distance(point);
-                flat(distance, normal)
+                let face = polytope.distance(point);
+                flat(face.distance_m, face.normal)
             }
             Self::Union(parts) => {
                 let nearest = parts.iter().map(|part| part.local_gap(point));

@@ -1,6 +1,6 @@
-//! How contact is solved.
+//! Parameters of the contact solver.
 
-/// How contact is solved.
+/// Parameters of the contact solver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactParams {
     /// The solid's Young's modulus, or one of that size \[Pa\]: the scale of penalties.
@@ -9,7 +9,7 @@ pub struct ContactParams {
     pub max_increment_m: f64,
     /// Penalty of pressures over `young_modulus_pa / size of the point's face`.
     pub penalty_ratio: f64,
-    /// The same of tractions.
+    /// Penalty of tractions, likewise.
     pub friction_penalty_ratio: f64,
     /// Largest change of pressures and tractions by the last solve, in their continuous part, as a share of the largest
     /// pressure.
@@ -20,7 +20,7 @@ pub struct ContactParams {
     pub max_updates: u32,
     /// Newton steps between two updates after which an increment is given up.
     pub max_newton_iterations: u32,
-    /// How often a failed increment is halved before the press is given up.
+    /// Halvings of a failed increment after which the press fails.
     pub max_halvings: u32,
 }
 

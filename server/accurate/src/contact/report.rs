@@ -1,12 +1,12 @@
-//! What contact does to the tool, and how exactly its law holds.
+//! Contact force on the tool, and errors of the contact law.
 
 use nalgebra::{Point3, Vector3};
 
-use super::outcome::ContactInfo;
 use super::press::Press;
+use super::result::ContactInfo;
 use super::state::ContactState;
 
-/// Fills in what can be read off the contact points: force on the tool `sum A (t - p n)`, its torque, area, and errors.
+/// Adds the sums over contact points: force on the tool `sum A (t - p n)`, its torque, area, and errors.
 pub(super) fn report(press: &Press<'_>, state: &ContactState, x: &[Vector3<f64>], info: ContactInfo) -> ContactInfo {
     let origin = Point3::from(state.pose.translation.vector);
     let mut info = info;

@@ -1,4 +1,4 @@
-//! What contact remembers from one increment of a tool's motion to the next.
+//! Contact history: pressures, tractions and anchors between increments of a tool's motion.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 

@@ -1,4 +1,4 @@
-//! Where contact is looked for: quadrature points on boundary faces.
+//! Contact surface: quadrature points on boundary faces.
 
 use std::ops::{Add, Mul, Sub};
 
@@ -31,7 +31,7 @@ impl ContactPoint {
     }
 }
 
-/// What a field on the surface may consist of.
+/// Value of a field on the surface.
 pub(super) trait FieldValue:
     Copy + Default + Add<Output = Self> + Sub<Output = Self> + Mul<f64, Output = Self>
 {
@@ -61,7 +61,7 @@ impl ContactSurface {
         Self { points, node_areas_m2 }
     }
 
-    /// Points of all boundary faces of `mesh` that are not given altogether.
+    /// Points of the boundary faces of `mesh` with a free coordinate.
     pub fn of_boundary(mesh: &HexMesh, constraints: &Constraints) -> Self {
         let mut quads = mesh.boundary_quads();
         quads.retain(|quad| quad.iter().any(|node| constraints.is_given(node.index()) != [true; 3]));

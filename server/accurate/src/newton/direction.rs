@@ -1,8 +1,8 @@
-//! The Newton step: a matrix that is positive definite, and what it lacks.
+//! Newton direction: factorise a positive definite Hessian, then correct for non-conservative loads.
 
 use nalgebra::Vector3;
 
-use super::{Info, Problem, SolveError, Solver, clear_given, dot, follower};
+use super::{Info, Problem, SolveError, Solver, clear_given, dot, gmres};
 use crate::energy::Projection;
 
 /// First shift of a matrix that stays indefinite, as a share of its mean diagonal; every further one is ten times larger.
@@ -18,7 +18,7 @@ impl Solver {
         x: &[Vector3<f64>],
         info: &mut Info,
     ) -> Result<(), SolveError> {
-        let loads = self.factorise_somehow(problem, moves, x, info)?;
+        let loads = self.factorise_candidates(problem, moves, x, info)?;
         for ((b, g), lift) in self.right_hand_side.iter_mut().zip(&self.gradient).zip(self.hessian.lift()) {
             *b = lift - g;
         }
@@ -33,9 +33,9 @@ impl Solver {
         Ok(())
     }
 
-    /// Tries the exact matrix; without the loads that have no potential, which alone may make it indefinite; the projected
-    /// one; shifts of it. The projection with which those loads are in the matrix.
-    fn factorise_somehow(
+    /// Factorises the first positive definite candidate: exact; exact but for follower loads; projected; shifted. Returns the
+    /// projection of the follower loads in it.
+    fn factorise_candidates(
         &mut self,
         problem: &Problem<'_>,
         moves: bool,
@@ -74,12 +74,11 @@ impl Solver {
         self.factor.factorise(&self.hessian).is_ok()
     }
 
-    /// Turns `H^-1 b` into `(H + R)^-1 b`, `R` being what the matrix lacks of loads without a potential; not where that would
-    /// point uphill.
+    /// Turns `H^-1 b` into `(H + R)^-1 b` with the remainder `R` of follower loads, unless that points uphill.
     fn follow_loads(&mut self, problem: &Problem<'_>, loads: Projection, x: &[Vector3<f64>]) {
         let (hessian, factor, product) = (&self.hessian, &mut self.factor, &mut self.single);
         let mut direction = self.direction.clone();
-        follower::solve(&mut direction, |v, out| {
+        gmres::solve(&mut direction, |v, out| {
             product.fill(Vector3::zeros());
             problem.energies.iter().for_each(|e| e.add_remainder_product(x, v, loads, product));
             clear_given(product, problem.constraints);

@@ -1,11 +1,11 @@
-//! How far to go along a Newton step.
+//! Backtracking line search along the Newton direction.
 
 use nalgebra::Vector3;
 
-use super::acceptance::{Judgement, Start, Total};
+use super::sufficient_decrease::{Judgement, Start, Total};
 use super::{Info, Problem, Residual, Solver, dot};
 
-/// Share of the slope that may be left after a step that is judged by its slope \[HZ05\].
+/// Largest slope after a step, as a share of the first, where energy differences are rounding \[HZ05\].
 const SLOPE_LEFT: f64 = 0.9;
 const MAX_HALVINGS: u32 = 30;
 
@@ -28,7 +28,7 @@ impl Solver {
         false
     }
 
-    /// Backtracks until the energy has fallen enough or, where its differences are rounding, the slope has.
+    /// Backtracks to a sufficient decrease of the energy or, where its differences are rounding, of the slope.
     pub(super) fn search_line(
         &mut self,
         problem: &Problem<'_>,
@@ -61,14 +61,14 @@ impl Solver {
         false
     }
 
-    /// Work against the loads that have no potential, held as they are, along the whole step \[J\].
+    /// Work against loads without a potential along the whole step, their forces held constant \[J\].
     fn frozen_work(&mut self, problem: &Problem<'_>, x: &[Vector3<f64>]) -> f64 {
         self.single.fill(Vector3::zeros());
         problem.energies.iter().filter(|e| !e.has_potential()).for_each(|e| e.add_gradient(x, &mut self.single));
         dot(&self.single, &self.direction)
     }
 
-    /// Judges `trial` by its forces; leaves the gradient as it was.
+    /// Acceptance of `trial` by its forces; keeps the gradient.
     fn is_better_by_forces(&mut self, problem: &Problem<'_>, start: &Start) -> bool {
         let gradient = self.gradient.clone();
         let trial = std::mem::take(&mut self.trial);

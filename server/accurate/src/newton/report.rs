@@ -1,8 +1,8 @@
-//! What a solve is asked for, what it tells and how it fails.
+//! Parameters, progress, result and errors of a Newton solve.
 
 use crate::factor::FactorError;
 
-/// When to stop.
+/// Stopping criteria.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Params {
     /// Largest force left at a free coordinate, as a share of the largest nodal force of any single energy.
@@ -17,7 +17,7 @@ impl Default for Params {
     }
 }
 
-/// How a solve went.
+/// Statistics of a solve.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Info {
     /// Residual before every Newton step and at the end, as a share of the largest nodal force.
@@ -32,7 +32,7 @@ pub struct Info {
     pub smallest_jacobian: Option<f64>,
 }
 
-/// What the callback is told before every Newton step.
+/// Progress, reported before every Newton step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
     /// Newton steps taken.
@@ -41,19 +41,19 @@ pub struct Progress {
     pub residual: f64,
 }
 
-/// Why a solve has no result. `x` is left where the solve gave up.
+/// Failure of a solve; `x` keeps its last iterate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SolveError {
     /// Too many steps.
     #[error(
-        "residual {residual:.1e} of the largest force after {iterations} Newton steps, {tolerance:.1e} was asked for"
+        "residual {residual:.1e} of the largest force after {iterations} Newton steps, the tolerance is {tolerance:.1e}"
     )]
     NotConverged {
         /// Newton steps taken.
         iterations: u32,
         /// Residual left.
         residual: f64,
-        /// Residual asked for.
+        /// Tolerance.
         tolerance: f64,
     },
     /// No step along the Newton direction helps.
@@ -76,7 +76,7 @@ pub enum SolveError {
         /// Newton steps taken.
         iterations: u32,
     },
-    /// The callback asked to stop.
+    /// Cancelled by the callback.
     #[error("cancelled after {iterations} Newton steps")]
     Cancelled {
         /// Newton steps taken.

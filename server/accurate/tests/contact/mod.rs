@@ -6,11 +6,11 @@ use std::ops::ControlFlow;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use plica_accurate::contact::{
-    ContactError, ContactInfo, ContactParams, ContactState, ContactSurface, Obstacle, Polytope, Press,
+    ContactError, ContactInfo, ContactParams, ContactState, ContactSurface, Obstacle, Press,
 };
 use plica_accurate::{Constraints, Energy, Material, MaterialModel, Solid, Solver, reactions};
 use plica_geometry::shapes::block;
-use plica_geometry::{HexMesh, NodeIdx};
+use plica_geometry::{ConvexPolytope, HexMesh, NodeIdx};
 
 /// A solid that is held somewhere, and the faces where it may be touched.
 pub struct Body {
@@ -129,7 +129,7 @@ impl Tool {
     }
 
     pub fn cuboid(half_extents_m: [f64; 3], friction: f64) -> Self {
-        Self::new(Obstacle::Polytope(Polytope::cuboid(half_extents_m).unwrap()), friction)
+        Self::new(Obstacle::Polytope(ConvexPolytope::cuboid(half_extents_m).unwrap()), friction)
     }
 
     /// The same, solved as exactly as the tests that compare forces need.

@@ -10,7 +10,7 @@ use crate::hex_mesh::{HexMesh, MeshError};
 use crate::index::{HexIdx, NodeIdx};
 use crate::isoparametric;
 
-/// What is left of a file once its format is forgotten.
+/// Content of a mesh file, independent of its format.
 #[derive(Debug, Default)]
 pub(super) struct Content {
     /// Positions in the unit of the file.
@@ -27,7 +27,7 @@ pub(super) struct Content {
 pub(super) struct Cell {
     pub(super) shape: Shape,
     pub(super) corners: [u32; 8],
-    /// What the file calls it.
+    /// Name in the file.
     pub(super) number: u64,
 }
 

@@ -1,4 +1,4 @@
-//! Why a mesh file was not read: where, what, and what to do.
+//! Error of a mesh file: place, cause and advice.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -15,9 +15,9 @@ pub struct ImportError {
     pub path: PathBuf,
     /// Where in it.
     pub place: Place,
-    /// What is wrong, with numbers.
+    /// Cause, with numbers.
     pub problem: String,
-    /// What to do.
+    /// Advice.
     pub advice: String,
 }
 

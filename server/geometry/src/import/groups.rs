@@ -2,7 +2,7 @@
 
 use crate::index::{HexIdx, NodeIdx};
 
-/// What a file calls a part of its mesh.
+/// Name of a part of the mesh in its file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Group {
     /// Its name; a physical group of Gmsh without one is called by its number.
@@ -43,7 +43,7 @@ impl Groups {
         self.iter().find(|group| group.name == name && group.dimension == 2)
     }
 
-    /// The group of that name of highest dimension below 3, else the volume: what a support or a probe means.
+    /// The group of that name of highest dimension below 3, else the volume, as a support or a probe expects.
     pub fn nodes(&self, name: &str) -> Option<&Group> {
         let named = self.iter().filter(|group| group.name == name);
         named.max_by_key(|group| if group.dimension == 3 { -1 } else { i32::from(group.dimension) })

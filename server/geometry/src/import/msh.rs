@@ -14,7 +14,7 @@ use super::error::{DAMAGED, Fault, fault};
 use elements::{Element, Kind};
 use reader::Reader;
 
-/// What a file has told so far.
+/// Content of the file read so far.
 #[derive(Default)]
 struct Tale {
     points: Vec<Point3<f64>>,
@@ -25,7 +25,7 @@ struct Tale {
     names: HashMap<(i32, i32), String>,
     /// MSH 4.1: physical groups of each entity by dimension and number.
     physical_of_entity: HashMap<(i32, i32), Vec<i32>>,
-    /// Elements that this project has no use for, by what they are, with their count.
+    /// Number of unused elements by type.
     unfit: Vec<(&'static Element, usize)>,
 }
 

@@ -1,4 +1,7 @@
 //! VTK's unstructured grids in XML (`.vtu`): text, base64 or raw data, inline or appended, plain or compressed.
+//!
+//! Stands beside vtkio, which writes these files in `export`, while vtkio is a release candidate: errors in a user's file
+//! have the place, cause and advice of all mesh imports.
 
 mod arrays;
 mod blocks;

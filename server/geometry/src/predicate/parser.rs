@@ -97,7 +97,7 @@ impl Parser<'_> {
         }
     }
 
-    /// What follows an opening parenthesis, with the closing one.
+    /// Expression after an opening parenthesis, with the closing one.
     fn parenthesis(&mut self) -> Result<Typed, PredicateError> {
         self.deeper()?;
         let inside = self.expression(0)?;

@@ -1,4 +1,4 @@
-//! What makes vertices and triangles a skin: valid values, a closed manifold.
+//! Checks of a skin: valid values, a closed manifold.
 
 use std::collections::HashMap;
 

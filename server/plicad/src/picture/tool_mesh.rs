@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Isometry3, Point3, Vector3};
+use plica_geometry::ConvexPolytope;
 use plica_sim::ToolShape;
 
 /// Steps around a round shape.
@@ -22,9 +23,10 @@ pub(super) fn tessellate(shape: &ToolShape, pose: &Isometry3<f64>) -> ToolMesh {
     let mut mesh = match shape {
         ToolShape::Ball { radius_m } => round(*radius_m, 0.0),
         ToolShape::Capsule { radius_m, length_m } => round(*radius_m, *length_m),
-        ToolShape::Cuboid { half_extents_m } => hull(&corners(*half_extents_m)),
-        ToolShape::ConvexHull { points_m } => hull(points_m),
-        ToolShape::Compound { hulls_m } => hulls_m.iter().map(|h| hull(h)).fold(ToolMesh::default(), joined),
+        ToolShape::Cuboid { .. } | ToolShape::ConvexHull { .. } | ToolShape::Compound { .. } => {
+            let polytopes = shape.polytopes().unwrap_or_default();
+            polytopes.iter().map(faceted).fold(ToolMesh::default(), joined)
+        }
     };
     mesh.positions.iter_mut().for_each(|p| *p = pose * *p);
     mesh.normals.iter_mut().for_each(|n| *n = pose * *n);
@@ -61,28 +63,15 @@ fn equator_twice(i: usize) -> f64 {
     0.5 * PI * share
 }
 
-fn corners(half: [f64; 3]) -> Vec<Point3<f64>> {
-    let sign = |i: usize, bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
-    (0..8).map(|i| Point3::new(sign(i, 0) * half[0], sign(i, 1) * half[1], sign(i, 2) * half[2])).collect()
-}
-
-/// Faces of a small convex hull, by trying every triangle: good enough for a picture of a few dozen points.
-fn hull(points: &[Point3<f64>]) -> ToolMesh {
-    const MOST: usize = 48;
-    let step = points.len().div_ceil(MOST).max(1);
-    let points: Vec<_> = points.iter().step_by(step).copied().collect();
+/// Triangles with one normal each.
+fn faceted(polytope: &ConvexPolytope) -> ToolMesh {
     let mut mesh = ToolMesh::default();
-    let n = points.len();
-    let triples = (0..n).flat_map(|a| (0..n).flat_map(move |b| (0..n).map(move |c| [a, b, c])));
-    for [a, b, c] in triples.filter(|[a, b, c]| a < b && a < c && b != c) {
-        let normal = (points[b] - points[a]).cross(&(points[c] - points[a]));
-        let Some(normal) = normal.try_normalize(1e-12) else { continue };
-        if points.iter().all(|p| (p - points[a]).dot(&normal) < 1e-9) {
-            let first = mesh.positions.len();
-            mesh.positions.extend([points[a], points[b], points[c]]);
-            mesh.normals.extend([normal; 3]);
-            mesh.triangles.push([first, first + 1, first + 2]);
-        }
+    for [a, b, c] in polytope.triangles().iter().map(|t| t.map(|v| polytope.vertices()[v])) {
+        let Some(normal) = (b - a).cross(&(c - a)).try_normalize(0.0) else { continue };
+        let first = mesh.positions.len();
+        mesh.positions.extend([a, b, c]);
+        mesh.normals.extend([normal; 3]);
+        mesh.triangles.push([first, first + 1, first + 2]);
     }
     mesh
 }

@@ -95,6 +95,11 @@ fn every_bad_file_gives_one_clear_message() {
         ("sampling = \"latest\" ", "sampling = \"interpolate\" ", &["tools.probe.delay_ms", "is missing", "add"]),
         ("[0.0, 0.0, 0.0, 1.0] }\ntool_from", "[0.0, 0.0, 0.0, 2.0] }\ntool_from", &["rotation_xyzw", "0.99 to 1.01"]),
         ("radius_m = 0.007", "radius_m = 0.0", &["tools.probe.shape.capsule.radius_m", "0.0005 to 0.5"]),
+        (
+            "capsule = { radius_m = 0.007, length_m = 0.1 }",
+            "convex_hull = { points_m = [[0, 0, 0], [0.01, 0, 0], [0, 0.01, 0], [0.01, 0.01, 0]] }",
+            &["tools.probe.shape.convex_hull.points_m", "the hull of 4 points has no volume", "plane"],
+        ),
         ("stale_after_ms = 200.0", "stale_after_s = 0.2", &["tools.probe.stale_after_s", "unknown field"]),
         ("max_contacts = 32", "max_contacts = 0", &["contact.max_contacts", "1 to 256"]),
         ("timestep_s = 0.001", "timestep_s = 1.0", &["runtime.timestep_s", "0.0001 to 0.02"]),

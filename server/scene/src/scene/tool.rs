@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 
 use nalgebra::{Isometry3, Point3, Translation3};
 use plica_geometry::import::read_obj_parts;
+use plica_geometry::{ConvexPolytope, HullError};
 use plica_sim::{Coupling, Sampling, SpringCoupling, ToolDescription, ToolShape};
 
 use super::raw::{RawCoupling, RawSampling, RawShape, RawTool, RawTransform};
@@ -60,7 +61,9 @@ fn check_shape(c: &Check<'_>, key: &str, raw: &RawShape) -> Result<ToolShape, Co
                 let problem = format!("{} points; the allowed range is {least} to {most}", points_m.len());
                 return Err(c.error(&key, problem, "give the corners of a body, not all in one plane"));
             }
-            Ok(ToolShape::ConvexHull { points_m: points_m.iter().map(|point| Point3::from(*point)).collect() })
+            let polytope = ConvexPolytope::hull(points_m.iter().map(|point| Point3::from(*point)).collect());
+            let flat = |e: HullError| c.error(&key, e.to_string(), "add points that do not lie in one plane");
+            Ok(ToolShape::ConvexHull { polytope: polytope.map_err(flat)? })
         }
         RawShape::Mesh { file, metres_per_unit } => {
             let key = format!("{key}.mesh");
@@ -68,7 +71,12 @@ fn check_shape(c: &Check<'_>, key: &str, raw: &RawShape) -> Result<ToolShape, Co
             let hulls = read_obj_parts(&path, *metres_per_unit).map_err(|problem| {
                 c.error(&format!("{key}.file"), problem, "give an OBJ file whose groups are convex parts")
             })?;
-            Ok(ToolShape::Compound { hulls_m: hulls })
+            let polytopes = hulls.into_iter().map(ConvexPolytope::hull).collect::<Result<_, _>>();
+            let flat = |e: HullError| {
+                let problem = format!("{}: {e}", path.display());
+                c.error(&format!("{key}.file"), problem, "give an OBJ file whose groups have a volume each")
+            };
+            Ok(ToolShape::Compound { polytopes: polytopes.map_err(flat)? })
         }
     }
 }

@@ -1,9 +1,6 @@
-//! Tool and plane shapes as signed distances. Everything that the run-time phase asks of a shape is exact and cheap: the
-//! general convex shape is an intersection of half-spaces, whose hull the collision library computes once.
+//! Tool and plane shapes as signed distances, exact and cheap: the general convex shape is an intersection of half-spaces.
 
-use nalgebra::Point3;
-use parry3d::math::Vector;
-use parry3d::shape::ConvexPolyhedron;
+use plica_geometry::{ConvexPolytope, FacePlane};
 
 use super::{M3, V3};
 use crate::description::ToolShape;
@@ -45,7 +42,7 @@ impl Placement {
 }
 
 impl Solid {
-    /// `None` if the points of a hull do not span a volume.
+    /// `None` for a cuboid without a volume.
     pub(crate) fn new(shape: &ToolShape) -> Option<Self> {
         match shape {
             ToolShape::Ball { radius_m } => {
@@ -54,17 +51,9 @@ impl Solid {
             ToolShape::Capsule { radius_m, length_m } => {
                 Some(Self::Round { a: V3::zeros(), b: V3::z() * *length_m as f32, radius: *radius_m as f32 })
             }
-            ToolShape::Cuboid { half_extents_m } => {
-                let h = half_extents_m;
-                let corner = |i: usize| {
-                    let sign = |bit: usize| if i >> bit & 1 == 0 { -1.0 } else { 1.0 };
-                    Point3::new(sign(0) * h[0], sign(1) * h[1], sign(2) * h[2])
-                };
-                Some(Self::Polytopes(vec![Polytope::hull(&(0..8).map(corner).collect::<Vec<_>>())?]))
-            }
-            ToolShape::ConvexHull { points_m } => Some(Self::Polytopes(vec![Polytope::hull(points_m)?])),
-            ToolShape::Compound { hulls_m } => {
-                Some(Self::Polytopes(hulls_m.iter().map(|h| Polytope::hull(h)).collect::<Option<_>>()?))
+            ToolShape::Cuboid { .. } | ToolShape::ConvexHull { .. } | ToolShape::Compound { .. } => {
+                let parts = shape.polytopes().ok()?;
+                Some(Self::Polytopes(parts.iter().map(Polytope::new).collect()))
             }
         }
     }
@@ -123,15 +112,17 @@ impl Solid {
 }
 
 impl Polytope {
-    fn hull(points: &[Point3<f64>]) -> Option<Self> {
-        let points: Vec<Vector> = points.iter().map(|p| Vector::new(p.x as f32, p.y as f32, p.z as f32)).collect();
-        let hull = ConvexPolyhedron::from_convex_hull(&points)?;
-        let plain = |v: &Vector| V3::new(v.x, v.y, v.z);
-        let vertices: Vec<V3> = hull.points().iter().map(plain).collect();
+    /// Table of `polytope` in `f32`: planes of the rounded vertices, with none of them above.
+    fn new(polytope: &ConvexPolytope) -> Self {
+        let vertices: Vec<V3> = polytope.vertices().iter().map(|v| v.coords.cast()).collect();
+        let normal = |face: &FacePlane| {
+            let [a, b, c] = polytope.triangles()[face.triangle].map(|v| vertices[v]);
+            triangle_normal(&a, &b, &c).unwrap_or(face.normal.cast())
+        };
         let support = |normal: &V3| vertices.iter().map(|v| normal.dot(v)).fold(f32::NEG_INFINITY, f32::max);
-        let planes = hull.faces().iter().map(|f| plain(&f.normal)).map(|n| (n, support(&n))).collect();
+        let planes = polytope.planes().iter().map(normal).map(|n| (n, support(&n))).collect();
         let center = vertices.iter().sum::<V3>() / vertices.len() as f32;
-        Some(Self { planes, vertices, center })
+        Self { planes, vertices, center }
     }
 
     /// Signed distance and outward normal of the nearest face; mitred outside edges, exact on and inside the surface.
@@ -173,6 +164,13 @@ impl Polytope {
     }
 }
 
+/// Unit normal; `None` for a triangle without an area.
+fn triangle_normal(a: &V3, b: &V3, c: &V3) -> Option<V3> {
+    let across = (b - a).cross(&(c - a));
+    let inverse = 1.0 / across.norm();
+    inverse.is_finite().then(|| across * inverse)
+}
+
 /// Nearest parameter on the segment `a b` to `p`, in [0, 1].
 pub(crate) fn nearest_on_segment(p: &V3, a: &V3, b: &V3) -> f32 {
     let ab = b - a;
@@ -194,4 +192,56 @@ pub(crate) fn nearest_segments(p: &V3, q: &V3, a: &V3, b: &V3) -> (f32, f32) {
     let clamped = t.clamp(0.0, 1.0);
     let s = if clamped == t { s } else { nearest_on_segment(&(a + d2 * clamped), p, q) };
     (s, clamped)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+    use nalgebra::Point3;
+
+    use super::*;
+
+    /// Points on a sphere by the golden angle: no two of their facets are coplanar.
+    fn sphere(n: usize, radius: f64) -> Vec<Point3<f64>> {
+        let point = |i: usize| {
+            let z = 1.0 - (2 * i + 1) as f64 / n as f64;
+            let (sin, cos) = (2.399_963_229_728_653 * i as f64).sin_cos();
+            let rim = (1.0 - z * z).sqrt();
+            Point3::new(radius * rim * cos, radius * rim * sin, radius * z)
+        };
+        (0..n).map(point).collect()
+    }
+
+    #[test]
+    fn a_table_has_the_distances_of_its_polytope() {
+        let cuboid = ConvexPolytope::cuboid([0.008, 0.012, 0.02]).unwrap();
+        let ball = ConvexPolytope::hull(sphere(1000, 0.01)).unwrap();
+        for (name, polytope) in [("cuboid", cuboid), ("ball", ball)] {
+            let table = Polytope::new(&polytope);
+            assert_eq!(table.planes.len(), polytope.planes().len(), "{name}");
+            let worst = [0.0, 0.003, 0.01, 0.012, 0.03].iter().flat_map(|r| sphere(200, *r)).map(|p| {
+                let (distance, _) = table.distance(&p.coords.cast());
+                (f64::from(distance) - polytope.distance(&p).distance_m).abs()
+            });
+            let worst = worst.fold(0.0, f64::max);
+            println!("{name}: {} planes, table within {worst:.1e} m", table.planes.len());
+            assert!(worst < 1e-8, "{name}: {worst}");
+        }
+    }
+
+    #[test]
+    fn a_facet_is_not_merged_with_an_inclined_neighbour() {
+        // 6-sided pyramid, its sides 1 degree steep.
+        let rim = (0..6).map(|k| {
+            let (sin, cos) = (f64::from(k) * std::f64::consts::FRAC_PI_3).sin_cos();
+            Point3::new(0.01 * cos, 0.01 * sin, 0.0)
+        });
+        let tips = [Point3::new(0.0, 0.0, 0.01 * 1.0_f64.to_radians().tan()), Point3::new(0.0, 0.0, -0.01)];
+        let solid = Solid::Polytopes(vec![Polytope::new(&ConvexPolytope::hull(rim.chain(tips).collect()).unwrap())]);
+        let above_rim = V3::new(-0.008, 0.0, 1e-3);
+        let (distance, _) = solid.distance(&above_rim);
+        let height = 1e-3 - 0.01 * 1.0_f32.to_radians().tan() * (1.0 - 0.008 / 0.01);
+        assert!((distance - height).abs() < 2e-6, "{distance}, {height}");
+    }
 }

@@ -12,7 +12,7 @@ pub(super) struct Element {
     pub(super) kind: Kind,
 }
 
-/// What becomes of an element.
+/// Import of an element type.
 #[derive(Debug)]
 pub(super) enum Kind {
     /// It is taken by its corners.

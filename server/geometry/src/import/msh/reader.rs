@@ -54,7 +54,7 @@ impl<'a> Reader<'a> {
         Place::Line(1 + read.iter().filter(|b| **b == b'\n').count())
     }
 
-    /// How many things of at least `bytes` each the rest of the file can hold: a bound on what to make room for.
+    /// Most items of at least `bytes` each in the rest of the file: a bound on allocations.
     pub(super) fn room_for(&self, n: u64, bytes: usize) -> usize {
         usize::try_from(n).unwrap_or(usize::MAX).min((self.bytes.len() - self.at) / bytes)
     }
@@ -174,7 +174,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The beginning of what was found, for a message of one line.
+/// Beginning of the text found, for a message of one line.
 fn shown(text: &str) -> String {
     const MOST: usize = 40;
     text.chars().take(MOST).map(|c| if c.is_control() { ' ' } else { c }).collect()

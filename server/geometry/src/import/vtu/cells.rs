@@ -7,7 +7,7 @@ use super::child;
 use crate::import::assemble::{Cell, Shape};
 use crate::import::error::{DAMAGED, Fault, Place, fault};
 
-/// What becomes of a VTK cell type.
+/// Import of a VTK cell type.
 enum Kind {
     Taken(Shape),
     /// A hexahedron whose corners run in x, then y, then z.

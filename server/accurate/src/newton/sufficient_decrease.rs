@@ -1,10 +1,10 @@
-//! Which steps a line search takes.
+//! Sufficient decrease: acceptance test of a line search \[NW06, eq. 3.6a\].
 
 use nalgebra::Vector3;
 
 use crate::energy::Energy;
 
-/// Share of the decrease that the slope promises which a step must reach \[NW06, eq. 3.6a\].
+/// Smallest decrease of a step, as a share of the linear prediction \[NW06, eq. 3.6a\].
 const SUFFICIENT_DECREASE: f64 = 1e-4;
 /// Share of the energies below which their differences are rounding.
 const ROUNDING: f64 = 1e-13;
@@ -32,19 +32,19 @@ pub(super) struct Start {
     pub(super) total: Total,
     /// Derivative of the energy along the step \[J\].
     pub(super) slope: f64,
-    /// Share of the slope that is of loads without a potential: in a line search they keep their forces.
+    /// Contribution of loads without a potential to the slope \[J\]: a line search holds their forces constant.
     pub(super) frozen_work: f64,
     /// Norm of the force at free coordinates \[N\].
     pub(super) norm: f64,
     pub(super) has_potential: bool,
 }
 
-/// What energies say of a step.
+/// Verdict on a step by energy differences.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Judgement {
     Accept,
     Refuse,
-    /// Nothing: the difference is rounding, or belongs to a load without a potential.
+    /// Undecided: the difference is rounding, or includes work of a load without a potential.
     AskForces,
 }
 

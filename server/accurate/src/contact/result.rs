@@ -1,12 +1,10 @@
-//! How a press went, how it goes, and why it may have no result.
+//! Result, progress and errors of a press.
 
 use nalgebra::Vector3;
 
-use super::increment::Failure;
-use super::params::ContactParams;
 use crate::newton::{Progress, SolveError};
 
-/// How a press went.
+/// Result of a press.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ContactInfo {
     /// Force on the tool \[N\].
@@ -23,7 +21,7 @@ pub struct ContactInfo {
     pub mean_gap_m: f64,
     /// Largest excess of a traction over `mu` times the point's pressure, as a share of the largest pressure.
     pub friction_excess: f64,
-    /// What the last solve changed of pressures and tractions, as a share of the largest pressure.
+    /// Change of pressures and tractions in the last solve, as a share of the largest pressure.
     pub pressure_change: f64,
     /// Force left at a free coordinate, as a share of the largest nodal force.
     pub residual: f64,
@@ -41,21 +39,21 @@ pub struct ContactInfo {
     pub smallest_jacobian: Option<f64>,
 }
 
-/// What the callback is told before every Newton step.
+/// Progress, reported before every Newton step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactProgress {
     /// Share of the path that the present increment ends at.
     pub share: f64,
     /// Increments solved.
     pub increments: u32,
-    /// The solve under way.
+    /// Current Newton solve.
     pub newton: Progress,
 }
 
-/// Why a press has no result. Positions and state are those of the last increment that was solved.
+/// Failure of a press. Positions and state are those of the last solved increment.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ContactError {
-    /// The callback asked to stop.
+    /// Cancelled by the callback.
     #[error("cancelled at {:.0} % of the path", 100.0 * share)]
     Cancelled {
         /// Share of the path that was reached.
@@ -68,7 +66,7 @@ pub enum ContactError {
         share: f64,
         /// Halvings.
         halvings: u32,
-        /// What failed.
+        /// Cause.
         source: SolveError,
     },
     /// Pressures and friction do not come to rest, even in small increments.
@@ -89,24 +87,4 @@ pub enum ContactError {
         /// Updates of the multipliers.
         max_updates: u32,
     },
-}
-
-impl Failure {
-    /// Fails if halving the increment cannot help, or was done often enough.
-    pub(super) fn give_up(self, share: f64, halvings: u32, params: &ContactParams) -> Result<(), ContactError> {
-        let may_help = halvings < params.max_halvings;
-        match self {
-            Self::Solve(SolveError::Cancelled { .. }) => Err(ContactError::Cancelled { share }),
-            Self::Solve(source @ SolveError::Factor(_)) => Err(ContactError::Solve { share, halvings, source }),
-            _ if may_help => Ok(()),
-            Self::Solve(source) => Err(ContactError::Solve { share, halvings, source }),
-            Self::Unsettled(fit) => Err(ContactError::Unsettled {
-                share,
-                halvings,
-                pressure_change: fit.pressure_change,
-                traction_change: fit.traction_change,
-                max_updates: params.max_updates,
-            }),
-        }
-    }
 }

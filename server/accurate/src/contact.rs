@@ -3,25 +3,24 @@
 //! [`Obstacle`]s are signed distances; a [`ContactSurface`] holds points on the solid's boundary faces; [`NormalContact`]
 //! and [`Friction`] are energies with given multipliers; [`Press::follow`] moves a tool along a path and finds the multipliers.
 
+mod follow;
 mod friction;
 mod increment;
-mod leg;
+mod increments;
 mod normal;
 mod obstacle;
-mod outcome;
 mod params;
-mod polytope;
 mod press;
 mod report;
+mod result;
 mod state;
 mod surface;
 
 pub use friction::{Friction, FrictionRow};
 pub use normal::NormalContact;
 pub use obstacle::{Gap, Obstacle};
-pub use outcome::{ContactError, ContactInfo, ContactProgress};
 pub use params::ContactParams;
-pub use polytope::{Polytope, PolytopeError};
 pub use press::Press;
+pub use result::{ContactError, ContactInfo, ContactProgress};
 pub use state::ContactState;
 pub use surface::{ContactPoint, ContactSurface};
