@@ -1,10 +1,11 @@
 //! All methods on the same held-out states.
 
+use plica_sim::enrichment::DEFAULT_METHOD;
 use serde::{Deserialize, Serialize};
 
 use super::degenerate::Degenerate;
 use super::judge::{EvaluationError, Judge};
-use super::methods::{DEFAULT_METHOD, Method};
+use super::methods::Method;
 use super::slide::Slide;
 use super::verdict::Verdict;
 
