@@ -13,7 +13,7 @@ use tempfile::TempDir;
 struct Patient;
 
 impl Watch for Patient {
-    fn progress(&self, _: &Progress) {}
+    fn progress(&self, _: &plica_training::Progress) {}
     fn cancelled(&self) -> bool {
         false
     }
