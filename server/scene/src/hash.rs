@@ -182,7 +182,7 @@ mod tests {
             ("max_contacts = 32", "max_contacts = 64"),
             ("full_press_s = 0.5", "full_press_s = 0.4"),
             ("method = \"kriging\"", "method = \"ridge\""),
-            ("radius_cells = 7.0", "radius_cells = 5.0"),
+            ("# radius_cells = 7.0", "radius_cells = 5.0"),
         ];
         for (from, to) in changes {
             assert_eq!(with(from, to), own, "{from} -> {to}");

@@ -192,7 +192,7 @@ fn check_enrichment(
     training: &TrainingConfig,
 ) -> Result<EnrichmentConfig, ConfigError> {
     let (_, object) = raw.objects.first_key_value().expect("the object was checked before");
-    enrichment::check(c, &object.enrichment, training.stamp_axes)
+    enrichment::check(c, &format!("objects.{name}.enrichment"), &object.enrichment, training.stamp_axes)
 }
 
 #[cfg(test)]

@@ -2,9 +2,8 @@
 
 use std::path::Path;
 
-use nalgebra::{Isometry3, Translation3};
-use plica_sim::ToolDescription;
-use plica_training::{InteractionSet, RecordedPose, Setup, Source};
+use plica_sim::world_from_tool;
+use plica_training::{IN_REGION, InteractionSet, RecordedPose, Setup, Source};
 
 use crate::hash::{HashError, scene_hash};
 use crate::model::{self, SceneModelError};
@@ -69,9 +68,6 @@ fn trained_set(config: &Config, training: &TrainingConfig, tool: usize) -> Resul
     })
 }
 
-/// Kind of the examples in the trained region.
-const IN_REGION: &str = "in_region";
-
 fn evaluation_sets(config: &Config, training: &TrainingConfig, tool: usize) -> Result<Vec<InteractionSet>, SetupError> {
     let in_region = InteractionSet {
         count: training.evaluation_examples as usize,
@@ -100,11 +96,4 @@ fn source(config: &Config, training: &TrainingConfig, tool: usize) -> Result<Sou
         pose: world_from_tool(&config.tools()[timed.tool], &timed.sample.pose),
     };
     Ok(Source::Recorded(poses.iter().map(pose).collect()))
-}
-
-/// As the simulation places tools: `world_from_tracker * scaled(tracker_from_marker) * tool_from_marker^-1`.
-fn world_from_tool(tool: &ToolDescription, tracker_from_marker: &Isometry3<f64>) -> Isometry3<f64> {
-    let scaled = Translation3::from(tracker_from_marker.translation.vector * tool.position_scale);
-    let scaled = Isometry3::from_parts(scaled, tracker_from_marker.rotation);
-    tool.world_from_tracker * scaled * tool.tool_from_marker.inverse()
 }

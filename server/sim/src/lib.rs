@@ -33,7 +33,7 @@ pub use probe::{NoProbe, Probe, Stage};
 pub use report::{ContactReading, TickReport, ToolReading};
 pub use state::State;
 pub use tick::tick;
-pub use tool::{PoseSample, ToolPose};
+pub use tool::{PoseSample, ToolPose, world_from_tool};
 pub use workspace::Workspace;
 
 /// What one tick is told: the time, and the device poses that arrived since the last one.

@@ -37,7 +37,7 @@ pub struct ToolReading {
     pub torque_n_m: Vector3<f64>,
     /// Sum of the contact forces on the tool \[N\].
     pub contact_force_n: Vector3<f64>,
-    /// Contact point: see DESIGN "Contact"; the last one is held after release \[m\].
+    /// Contact point on the deformed skin; the last one is held after release \[m\].
     pub contact_point_m: Point3<f64>,
     /// The same point pulled back to the reference skin \[m\].
     pub reference_contact_point_m: Point3<f64>,

@@ -170,6 +170,7 @@ fn find_contacts(model: &Model, state: &State, workspace: &mut Workspace, report
         let first_row = workspace.rows.rows.len();
         let velocity = |arm: V3| at_arm(&twist, lever, &arm);
         report.dropped_contacts += workspace.rows.select(&model.embedding, &state.v, candidates, velocity, &selection);
+        report.dropped_contacts += workspace.detector.overflow;
         // A row that is only predicted may push in this very solve.
         let may_touch = workspace.rows.rows.len() > first_row;
         if let Some(point) = workspace.contact_points.get_mut(body) {

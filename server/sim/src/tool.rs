@@ -175,8 +175,8 @@ impl PoseTrack {
     }
 }
 
-/// `world_from_tracker * scaled(tracker_from_marker) * tool_from_marker^-1`
-fn world_from_tool(tool: &ToolDescription, tracker_from_marker: &Isometry3<f64>) -> Isometry3<f64> {
+/// Pose of a tool from a tracked pose: `world_from_tracker * scaled(tracker_from_marker) * tool_from_marker^-1`.
+pub fn world_from_tool(tool: &ToolDescription, tracker_from_marker: &Isometry3<f64>) -> Isometry3<f64> {
     let scaled = Translation3::from(tracker_from_marker.translation.vector * tool.position_scale);
     tool.world_from_tracker
         * Isometry3::from_parts(scaled, tracker_from_marker.rotation)

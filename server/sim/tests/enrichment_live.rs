@@ -5,7 +5,7 @@ mod common;
 
 use std::sync::{Arc, LazyLock};
 
-use common::examples::{Press, RADIUS, examples, presses, scene, size};
+use common::examples::{Bench, Press, RADIUS, examples, press_of, presses, scene, size};
 use common::{Run, at, ball, top, top_normal};
 use nalgebra::{Point3, Vector3};
 use plica_sim::Model;
@@ -23,8 +23,12 @@ struct Enriched {
 
 impl Enriched {
     fn new(n_tools: usize) -> Self {
+        Self::with(n_tools, EnrichmentOptions::default())
+    }
+
+    fn with(n_tools: usize, options: EnrichmentOptions) -> Self {
         let model = (1..n_tools).fold(scene(), |scene, _| scene.tool(ball(RADIUS))).run().model;
-        let enricher = Enricher::new(&model, &examples(&TAUGHT), EnrichmentOptions::default()).unwrap();
+        let enricher = Enricher::new(&model, &examples(&TAUGHT), options).unwrap();
         let run = Run::new(model);
         let live = LiveEnrichment::new(&run.model, Arc::new(enricher));
         let skin = vec![[0.0; 3]; run.model.n_skin()];
@@ -242,4 +246,38 @@ fn an_enricher_knows_its_model() {
     assert!(enricher.fits(&model));
     let other: Model = common::Scene::block(common::E, 0.45).run().model;
     assert!(!enricher.fits(&other));
+}
+
+/// A running simulation puts on the skin what an evaluation of the same state measures, by whatever method: to 0.1 um, but for
+/// the vertices that the tool keeps out.
+#[test]
+fn every_method_serves_what_it_is_measured_by() {
+    let axes = [Vector3::x(), Vector3::y()];
+    for method in METHODS {
+        let mut it = Enriched::with(1, method.options(axes));
+        it.glide(deep(0.05, 0.03, 0.0), deep(0.05, 0.03, 0.005), 100, |_| ());
+        it.live.forget();
+        it.tick(&[deep(0.05, 0.03, 0.005)]);
+        let mut bench = Bench::new(&TAUGHT, method.options(axes));
+        let confidence = bench.enrich(&press_of(&it.run), 1.0);
+        let centre = Point3::from(it.run.state.tools()[0].proxy.translation.vector).cast::<f32>();
+        let (mut largest, mut worst, mut compared) = (0.0_f64, 0.0_f64, 0);
+        for ((served, coarse), detail) in it.skin.iter().zip(it.coarse()).zip(&bench.detail) {
+            let measured = [0, 1, 2].map(|k| coarse[k] + detail[k]);
+            if (Point3::from(measured) - centre).norm() > RADIUS as f32 {
+                worst = worst.max(size(&[0, 1, 2].map(|k| served[k] - measured[k])));
+                largest = largest.max(size(detail));
+                compared += 1;
+            }
+        }
+        println!(
+            "{:25} {:.2} mm of detail, {:.1e} m apart, confidence {confidence:.2}",
+            method.name,
+            1e3 * largest,
+            worst
+        );
+        assert!(10 * compared > 9 * it.skin.len() && largest > 3e-4, "{}: {compared} {largest}", method.name);
+        assert!(worst < 1e-7, "{}: {worst} m apart", method.name);
+        assert!((it.live.confidence(0) - confidence).abs() < 1e-4, "{}", method.name);
+    }
 }

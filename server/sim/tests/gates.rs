@@ -5,6 +5,7 @@ mod common;
 
 use common::{E, Run, Scene, at, ball, relative, top, top_normal};
 use nalgebra::{Point3, Vector3};
+use plica_geometry::shapes::{block, block_skin};
 use plica_sim::*;
 
 const RADIUS_M: f64 = 0.01;
@@ -146,4 +147,14 @@ fn snapshot_brings_back_every_bit() {
     run.state = snapshot.clone();
     run.workspace = Workspace::new(&run.model);
     assert!(replay(&mut run) == first, "a new workspace shows");
+}
+
+/// A nearly flat tool comes near more skin points than are kept for selection; those beyond are reported as well.
+#[test]
+fn candidates_beyond_the_room_are_reported_as_dropped() {
+    const KEPT_CANDIDATES: u32 = 4096;
+    let (size, radius) = ([0.08, 0.04, 0.04], 10.0);
+    let mut run = Scene::on(block(size, [8, 4, 4]), block_skin(size, 0.6e-3), E, 0.45).tool(ball(radius)).run();
+    let report = run.tick(&[(0, at(Point3::new(0.04, 0.02, 0.04 + radius)))]);
+    assert!(report.dropped_contacts > KEPT_CANDIDATES, "{}", report.dropped_contacts);
 }

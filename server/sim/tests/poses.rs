@@ -3,6 +3,8 @@
 
 mod common;
 
+use std::f64::consts::{FRAC_PI_2, PI};
+
 use common::{E, Run, Scene, at, ball, turned};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 use plica_geometry::shapes::{block, block_skin};
@@ -370,4 +372,22 @@ fn invalid_sample_is_no_news() {
         }
         assert!(reading(&run).stale && reading(&run).placements == 0);
     }
+}
+
+/// The formula as it is published, and the place where a tick puts a rigid tool.
+#[test]
+fn a_tracked_pose_is_scaled_between_tracker_and_marker() {
+    let mut tool = ball(0.01);
+    tool.coupling = Coupling::Rigid;
+    tool.position_scale = 0.5;
+    tool.world_from_tracker = turned(Point3::new(0.1, 0.0, 0.2), Vector3::new(0.0, 0.0, FRAC_PI_2));
+    tool.tool_from_marker = at(Point3::new(0.0, 0.0, 0.03));
+    let tracked = turned(Point3::new(0.2, 0.4, 0.6), Vector3::new(PI, 0.0, 0.0));
+    let pose = world_from_tool(&tool, &tracked);
+    // Half of (0.2, 0.4, 0.6), turned about z to (-0.2, 0.1, 0.3), moved; the marker is 30 mm along the tool's z, which points down.
+    let expected = Vector3::new(-0.2 + 0.1, 0.1, 0.3 + 0.2 + 0.03);
+    assert!((pose.translation.vector - expected).norm() < 1e-12, "{pose:?}");
+    let mut run = Scene::block(E, 0.45).tool(tool).run();
+    run.tick(&[(0, tracked)]);
+    assert_eq!(run.state.tools()[0].proxy, pose);
 }

@@ -48,8 +48,8 @@ pub use random::GENERATOR;
 pub use report::{Report, Run, Solves, Spread, Summary, largest, rms};
 pub use sensitivity::{Difference, Force, Sensitivity, Variations, sensitivity};
 pub use setup::{
-    AccurateDescription, Approach, DriveOptions, FeatureScales, InteractionSet, PressRanges, RecordedPose, Setup,
-    Source,
+    AccurateDescription, Approach, DriveOptions, FeatureScales, IN_REGION, InteractionSet, PressRanges, RecordedPose,
+    Setup, Source,
 };
 pub use tandem::{CoarseHalf, Load, SMALLEST_JACOBIAN, Stop, Tandem};
 pub use way::Way;

@@ -105,6 +105,9 @@ impl Default for FeatureScales {
     }
 }
 
+/// Name of the set in the trained region, and kind of its examples.
+pub const IN_REGION: &str = "in_region";
+
 /// Interactions that are drawn alike.
 #[derive(Debug, Clone)]
 pub struct InteractionSet {

@@ -3,7 +3,7 @@
 
 mod common;
 
-use std::cell::RefCell;
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use plica_training::evaluation::*;
@@ -13,7 +13,7 @@ use tempfile::TempDir;
 struct Patient;
 
 impl Watch for Patient {
-    fn progress(&self, _: &Progress) {}
+    fn progress(&self, _: &plica_training::Progress) {}
     fn cancelled(&self) -> bool {
         false
     }
@@ -53,9 +53,10 @@ fn every_method_is_judged_by_the_same_states() {
     let judge = Judge::new(&setup, &training, &held_out).unwrap();
     assert_eq!((judge.n_states(), judge.n_left_out(), judge.n_examples()), ([6, 4], 0, n_examples));
     let methods = methods(setup.stamp_axes);
-    let told = RefCell::new(Vec::new());
-    let found = evaluate(&judge, &methods, usize::MAX, &|done, all, what| {
-        told.borrow_mut().push((done, all, what.to_owned()));
+    let mut parts = Vec::new();
+    let found = evaluate(&judge, &methods, usize::MAX, &mut |progress| {
+        parts.push((progress.done, progress.all));
+        ControlFlow::Continue(())
     });
     let found = found.unwrap();
     for m in &found.methods {
@@ -96,9 +97,10 @@ fn every_method_is_judged_by_the_same_states() {
 
     let counts: Vec<_> = found.by_examples.iter().map(|v| (v.name.as_str(), v.examples)).collect();
     assert_eq!(counts, [(DEFAULT_METHOD, 16), ("ridge-vector", 16), ("ssh12-blend", 16)]);
-    let told = told.into_inner();
-    assert_eq!(told.len(), methods.len() + 3);
-    assert!(told.iter().enumerate().all(|(i, (done, all, _))| *done == i && *all == told.len()));
+    let n = methods.len() + 3;
+    assert_eq!(parts, (0..n).map(|i| (i, n)).collect::<Vec<_>>());
+    let stopped = evaluate(&judge, &methods, usize::MAX, &mut |_| ControlFlow::Break(())).unwrap_err().to_string();
+    assert!(stopped.contains("interrupted"), "{stopped}");
 }
 
 #[test]
@@ -170,7 +172,7 @@ fn a_slide_is_smooth_where_the_accurate_solution_is() {
     let (training, held_out) = (train(&setup, JobKind::Training), train(&setup, JobKind::Evaluation));
     let judge = Judge::new(&setup, &training, &held_out).unwrap();
     let chosen: Vec<Method> = methods(setup.stamp_axes).into_iter().filter(|m| m.name != "rbf-vector").collect();
-    let found = slide(&setup, &judge, &chosen, usize::MAX, (&|_, _, _| {}, &|| false)).unwrap();
+    let found = slide(&setup, &judge, &chosen, usize::MAX, &mut |_| ControlFlow::Continue(())).unwrap();
     println!("{} states, {} rejected, {:?}", found.states, found.rejected, found.accurate);
     found.methods.iter().for_each(|m| println!("{:26} {:?} {:?}", m.name, m.roughness, m.error));
     // 16 mm to go at most, and the way down and up.
@@ -182,6 +184,6 @@ fn a_slide_is_smooth_where_the_accurate_solution_is() {
         default.roughness.max_mm < 2.0 * found.accurate.max_mm,
         "no jump that the accurate solution knows nothing of"
     );
-    let stopped = slide(&setup, &judge, &chosen, usize::MAX, (&|_, _, _| {}, &|| true)).unwrap_err().to_string();
+    let stopped = slide(&setup, &judge, &chosen, usize::MAX, &mut |_| ControlFlow::Break(())).unwrap_err().to_string();
     assert!(stopped.contains("interrupted"), "{stopped}");
 }

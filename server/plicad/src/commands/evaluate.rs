@@ -3,11 +3,12 @@
 mod databases;
 mod table;
 
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use plica_training::evaluation::{Evaluation, Judge, Method, evaluate, methods, slide};
+use plica_training::evaluation::{Evaluation, Judge, Method, Progress, evaluate, methods, slide};
 
 use crate::cli::EvaluateArgs;
 pub(super) use databases::read;
@@ -22,10 +23,13 @@ pub fn run(args: &EvaluateArgs, json: bool) -> anyhow::Result<()> {
     let judge = Judge::new(&setup, &training, &held_out)?;
     let n_examples = args.examples.map_or(usize::MAX, |n| n as usize);
     let bar = bar();
-    let told = |done: usize, all: usize, what: &str| tell(&bar, done, all, what);
-    let mut found = evaluate(&judge, &methods, n_examples, &told)?;
+    let mut observer = |p: Progress<'_>| {
+        tell(&bar, p.done, p.all, p.part);
+        ControlFlow::Continue(())
+    };
+    let mut found = evaluate(&judge, &methods, n_examples, &mut observer)?;
     if args.slide {
-        found.slide = Some(slide(&setup, &judge, &methods, n_examples, (&told, &|| false))?);
+        found.slide = Some(slide(&setup, &judge, &methods, n_examples, &mut observer)?);
     }
     bar.finish_and_clear();
     table::print(config.name(), &found);

@@ -8,6 +8,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use plica_daemon::database_loader::Enrichment;
 use plica_scene::Config;
 use plica_scene::{model, setup};
+use plica_sim::enrichment::Contact;
 use plica_sim::{Model, State};
 use plica_training::{Example, Interaction, Outcome, Setup, Tandem, largest, plan, rms};
 use serde::Serialize;
@@ -67,7 +68,8 @@ pub(super) fn held_out(config: &Config, database: &Path) -> anyhow::Result<HeldO
     state.write_padded_offsets(&model, &mut offsets);
     let mut detail = vec![[0.0; 4]; model.n_skin()];
     let touch = example.touch();
-    let confidence = enricher.evaluate(&model, &state, &offsets, &touch, &mut enricher.scratch(), &mut detail);
+    let confidence =
+        enricher.evaluate(&Contact::new(&model, &state, &offsets, &touch), &mut enricher.scratch(), &mut detail);
 
     let mut coarse = vec![[0.0; 3]; model.n_skin()];
     state.write_skin(&model, &mut coarse);

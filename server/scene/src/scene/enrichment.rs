@@ -3,72 +3,72 @@
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
-use plica_sim::enrichment::{
-    Coordinates, Correlator, EnrichmentOptions, FieldOptions, Interpolator, LinearKind, Ssh12Options,
-};
+use plica_sim::enrichment::{Coordinates, EnrichmentOptions, FAMILIES, Interpolator, METHODS};
 
-use super::raw::{RawCoordinates, RawEnrichment, RawEnrichmentMethod, RawInterpolation};
+use super::raw::{RawCoordinates, RawEnrichment, RawInterpolation};
 use crate::checks::Check;
 use crate::error::ConfigError;
-
-/// Width of radial basis functions, in coarse cells.
-const RBF_WIDTH_CELLS: f64 = 4.0 / 3.0;
-/// Shares of a chart's radius between which a blend or a warp passes from near to far.
-const WIDE_WINDOW: [f64; 2] = [0.5, 1.0];
 
 /// How examples become detail on the skin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EnrichmentConfig {
-    /// The way.
+    /// The method.
     pub options: EnrichmentOptions,
     /// Examples to start with.
     pub database: Option<PathBuf>,
 }
 
-/// `axes` are those that stamps are laid out along.
+/// Stamps are laid out along `axes`.
 pub(super) fn check(
     c: &Check<'_>,
+    key: &str,
     raw: &RawEnrichment,
     axes: [Vector3<f64>; 2],
 ) -> Result<EnrichmentConfig, ConfigError> {
-    let default = EnrichmentOptions::default();
-    let correlator = correlator(raw.method);
-    let interpolator = interpolator(raw.interpolation);
-    let is_wide = matches!(interpolator, Interpolator::Blend | Interpolator::Warp);
+    let mut options = method(c, key, raw, axes)?;
+    if let Some(texels) = raw.texels {
+        options.field.texels = texels as usize;
+    }
+    if let Some(modes) = raw.modes {
+        options.field.modes = modes as usize;
+    }
+    if let Some(radius_cells) = raw.radius_cells {
+        options.radius_cells = radius_cells;
+    }
+    if let Some(coordinates) = raw.coordinates {
+        options.coordinates = match coordinates {
+            RawCoordinates::Exponential => Coordinates::Exponential,
+            RawCoordinates::Orthogonal => Coordinates::Orthogonal,
+        };
+    }
+    options.fade = raw.fade.unwrap_or(options.fade);
     let folder = c.document().file().parent().map(PathBuf::from).unwrap_or_default();
-    Ok(EnrichmentConfig {
-        options: EnrichmentOptions {
-            correlator,
-            field: FieldOptions {
-                interpolator,
-                texels: raw.texels as usize,
-                window: if is_wide { WIDE_WINDOW } else { default.field.window },
-                modes: raw.modes as usize,
-                control_variate: matches!(correlator, Correlator::Kriging | Correlator::Rescale),
-                ..default.field
-            },
-            radius_cells: raw.radius_cells,
-            coordinates: match raw.coordinates {
-                RawCoordinates::Exponential => Coordinates::Exponential,
-                RawCoordinates::Orthogonal => Coordinates::Orthogonal,
-            },
-            fade: raw.fade,
-            axes,
-            ..default
-        },
-        database: raw.database.as_ref().map(|typed| folder.join(typed)),
-    })
+    Ok(EnrichmentConfig { options, database: raw.database.as_ref().map(|typed| folder.join(typed)) })
 }
 
-fn correlator(raw: RawEnrichmentMethod) -> Correlator {
-    match raw {
-        RawEnrichmentMethod::Kriging => Correlator::Kriging,
-        RawEnrichmentMethod::Ssh12 => Correlator::Ssh12(Ssh12Options::default()),
-        RawEnrichmentMethod::Linear => Correlator::Linear(LinearKind::Regression),
-        RawEnrichmentMethod::Ridge => Correlator::Linear(LinearKind::Ridge),
-        RawEnrichmentMethod::Harmonic => Correlator::Linear(LinearKind::Harmonic),
-        RawEnrichmentMethod::Rbf => Correlator::Rbf { width_cells: RBF_WIDTH_CELLS },
-        RawEnrichmentMethod::Rescale => Correlator::Rescale,
+/// A row of [`METHODS`], or a family with an interpolation.
+fn method(
+    c: &Check<'_>,
+    key: &str,
+    raw: &RawEnrichment,
+    axes: [Vector3<f64>; 2],
+) -> Result<EnrichmentOptions, ConfigError> {
+    let interpolator = raw.interpolation.map(interpolator);
+    if let Some(options) = EnrichmentOptions::of_family(&raw.method, interpolator, axes) {
+        return Ok(options);
+    }
+    let Some(options) = EnrichmentOptions::named(&raw.method, axes) else {
+        let names: Vec<&str> = METHODS.iter().map(|m| m.name).collect();
+        let advice =
+            format!("choose one of {}; or a family, {}, with `interpolation`", names.join(", "), FAMILIES.join(", "));
+        return Err(c.error(&format!("{key}.method"), format!("no method `{}`", raw.method), advice));
+    };
+    match interpolator {
+        Some(other) if other != options.field.interpolator => {
+            let problem = format!("`{}` contradicts method = \"{}\"", other.name(), raw.method);
+            Err(c.error(&format!("{key}.interpolation"), problem, "remove one of the two"))
+        }
+        _ => Ok(options),
     }
 }
 

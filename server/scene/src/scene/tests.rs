@@ -42,24 +42,80 @@ fn the_built_in_scene_writes_the_defaults() {
     assert_eq!(bare.runtime().realtime_priority(), config.runtime().realtime_priority());
 }
 
-/// Enrichment says the same, whether it is written out or left out, and each way of it has a name.
+/// Enrichment of the built-in scene with the line of its method replaced.
+fn enrichment_with(lines: &str) -> EnrichmentConfig {
+    let from = "method = \"kriging-stamp\"";
+    assert!(BUILT_IN_SCENE.contains(from), "{from}");
+    let text = BUILT_IN_SCENE.replacen(from, &format!("{lines}\n"), 1);
+    Config::parse(Path::new("scenes/wedge.toml"), &text).unwrap().enrichment
+}
+
 #[test]
 fn enrichment_reads() {
-    use plica_sim::enrichment::{Coordinates, Correlator, EnrichmentOptions, Interpolator};
-    let read = |from: &str, to: &str| {
-        assert!(BUILT_IN_SCENE.contains(from), "{from}");
-        Config::parse(Path::new("scenes/wedge.toml"), &BUILT_IN_SCENE.replacen(from, to, 1)).unwrap().enrichment
-    };
+    use plica_sim::enrichment::{Coordinates, EnrichmentOptions, Interpolator};
     let own = Config::built_in().unwrap().enrichment;
     assert_eq!(own, EnrichmentConfig { options: EnrichmentOptions::default(), database: None });
-    let changed = read("method = \"kriging\"", "method = \"ssh12\"").options;
-    assert!(matches!(changed.correlator, Correlator::Ssh12(_)) && !changed.field.control_variate);
-    let changed = read("interpolation = \"stamp\"", "interpolation = \"warp\"").options;
-    assert_eq!(changed.field.interpolator, Interpolator::Warp);
-    let changed = read("coordinates = \"exponential\"", "coordinates = \"orthogonal\"").options;
-    assert_eq!(changed.coordinates, Coordinates::Orthogonal);
-    let named = read("# database = ", "database = ").database;
+    assert_eq!(enrichment_with(""), own, "left out, the method is the default");
+    let overrides = "texels = 16\nmodes = 8\nradius_cells = 3\nfade = false\ncoordinates = \"orthogonal\"";
+    let changed = enrichment_with(overrides).options;
+    assert_eq!((changed.field.texels, changed.field.modes, changed.radius_cells), (16, 8, 3.0));
+    assert_eq!((changed.fade, changed.coordinates), (false, Coordinates::Orthogonal));
+    let changed = enrichment_with("interpolation = \"warp\"\nmethod = \"ridge\"").options;
+    assert_eq!((changed.correlator.family(), changed.field.interpolator), ("ridge", Interpolator::Warp));
+    let named = enrichment_with("database = \"wedge.safetensors\"").database;
     assert_eq!(named.as_deref(), Some(Path::new("scenes/wedge.safetensors")));
+}
+
+/// A name in a scene gives the options that `evaluate` and `chart` measure under that name; so does its family with the interpolation.
+#[test]
+fn a_scene_serves_the_method_that_is_measured_under_its_name() {
+    use plica_training::evaluation::methods;
+    let axes = Config::built_in().unwrap().training().stamp_axes;
+    for measured in methods(axes) {
+        let name = &measured.name;
+        assert_eq!(enrichment_with(&format!("method = \"{name}\"")).options, measured.options, "{name}");
+        if let [family, interpolation] = name.split('-').collect::<Vec<_>>()[..] {
+            let both = format!("method = \"{family}\"\ninterpolation = \"{interpolation}\"");
+            assert_eq!(enrichment_with(&both).options, measured.options, "{name}");
+        }
+    }
+}
+
+/// Rows of the accuracy table that describe a method in words.
+const DESCRIBED: [(&str, &str); 4] = [
+    ("coarse skin", ""),
+    ("the same without control variate", "kriging-stamp-plain"),
+    ("the same, projected orthogonally as in the paper", "kriging-stamp-orthogonal"),
+    ("ssh12-vector, Eq. 10 as printed", "ssh12-vector-literal"),
+];
+
+/// Methods in the first column of the published accuracy table.
+fn published_methods() -> Vec<String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let texts =
+        ["docs/measured.md", "README.md"].map(|file| std::fs::read_to_string(root.join(file)).unwrap_or_default());
+    let header = "| method | E in the region |";
+    let text = texts.iter().find(|text| text.contains(header)).expect("an accuracy table");
+    let rows =
+        text.lines().skip_while(|line| !line.starts_with(header)).skip(2).take_while(|line| line.starts_with('|'));
+    let name = |row: &str| {
+        let cell = row.split('|').nth(1).unwrap().trim().replace(['*', '`'], "");
+        let described = DESCRIBED.iter().find(|(words, _)| *words == cell).map(|(_, name)| (*name).to_owned());
+        described.unwrap_or_else(|| cell.split([' ', ',']).next().unwrap().to_owned())
+    };
+    rows.map(name).filter(|name| !name.is_empty()).collect()
+}
+
+#[test]
+fn every_method_of_the_published_accuracy_table_can_be_configured() {
+    let published = published_methods();
+    assert!(published.len() >= 14, "{published:?}");
+    for name in published {
+        let axes = Config::built_in().unwrap().training().stamp_axes;
+        let measured = plica_training::evaluation::methods(axes).into_iter().find(|m| m.name == name);
+        let measured = measured.unwrap_or_else(|| panic!("`{name}` is published and has no row"));
+        assert_eq!(enrichment_with(&format!("method = \"{name}\"")).options, measured.options);
+    }
 }
 
 #[test]
@@ -129,14 +185,19 @@ fn every_bad_file_gives_one_clear_message() {
         ),
         ("candidates_per_example = 2", "candidates_per_example = 1", &["candidates_per_example", "2 to 1000"]),
         (
-            "method = \"kriging\"",
+            "method = \"kriging-stamp\"",
             "method = \"krigging\"",
-            &["enrichment.method", "unknown variant `krigging`", "`ssh12`"],
+            &["enrichment.method", "no method `krigging`", "ssh12-vector", "choose"],
         ),
-        ("texels = 32", "texels = 1000", &["enrichment.texels", "8 to 256"]),
-        ("modes = 32", "modes = 0", &["enrichment.modes", "1 to 100000"]),
-        ("radius_cells = 7.0", "radius_cells = 0.1", &["enrichment.radius_cells", "0.5 to 64"]),
-        ("fade = true", "fading = true", &["enrichment.fading", "unknown field `fading`", "fade"]),
+        (
+            "# interpolation = \"stamp\"",
+            "interpolation = \"blend\"",
+            &["enrichment.interpolation", "`blend` contradicts method = \"kriging-stamp\"", "remove"],
+        ),
+        ("# texels = 32", "texels = 1000", &["enrichment.texels", "8 to 256"]),
+        ("# modes = 32", "modes = 0", &["enrichment.modes", "1 to 100000"]),
+        ("# radius_cells = 7.0", "radius_cells = 0.1", &["enrichment.radius_cells", "0.5 to 64"]),
+        ("# fade = true", "fading = true", &["enrichment.fading", "unknown field `fading`", "fade"]),
     ];
     for (from, to, fragments) in cases {
         let (message, line) = message_and_line(from, to);

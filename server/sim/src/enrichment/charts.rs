@@ -202,7 +202,7 @@ impl Charts {
     fn blend(&self, chart: &ChartAt, out: &mut [[F; 2]]) {
         let n_groups = self.groups.n();
         let row = |(anchor, _): &Term| &self.rows[*anchor as usize * n_groups..][..n_groups];
-        // Fewer than three anchors are few indeed: those that are not there count nothing.
+        // Missing anchors have weight zero.
         let [a, b, c] = &chart.terms;
         let matrices = [a, b, c].map(|(_, m)| m.map(|r| r.map(F::splat)));
         let offset = chart.offset.map(|o| F::splat(-o));

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use plica_geometry::ReferenceSkin;
 
-use super::enricher::EnricherError;
+use super::error::EnricherError;
 use super::fade::Trust;
 use super::kriging::{Kriging, KrigingChoice};
 use super::linear::Linear;

@@ -1,16 +1,15 @@
 //! One way to enrich: how the present state is compared with the examples, and how their detail is laid on the skin.
 
-use nalgebra::Matrix3;
-
 use super::charts::{ChartOptions, Charts};
 use super::correlation::Correlation;
+use super::error::EnricherError;
 use super::examples::{Examples, SeenExamples, check, without_duplicates};
 use super::fade::Trust;
 use super::field::{Field, FieldScratch};
 use super::kriging::KrigingChoice;
 use super::options::{Correlator, EnrichmentOptions};
 use super::rescale::Rescale;
-use super::situation::{Offsets, Situation, Touch, coordinates};
+use super::situation::{Contact, Offsets, Touch, coordinates};
 use super::surface::{Place, Surface};
 use crate::contact::V3;
 use crate::lanes::{F, LANES, Node};
@@ -19,34 +18,6 @@ use crate::state::State;
 
 /// Normals farther apart than this lie on sides of the object that have nothing to do with each other \[rad\].
 const MAX_NORMAL_ANGLE: f64 = 2.2;
-
-/// Why there is no enricher.
-#[derive(Debug, thiserror::Error)]
-pub enum EnricherError {
-    /// An array of the examples has another length than the model or the other arrays.
-    #[error("example {example} has {found} {what}, {expected} are needed")]
-    Length {
-        /// The example.
-        example: usize,
-        /// Which array.
-        what: &'static str,
-        /// Its length.
-        found: usize,
-        /// The length it should have.
-        expected: usize,
-    },
-    /// Fewer examples than the method needs.
-    #[error("{found} examples, at least {needed} are needed")]
-    TooFew {
-        /// Examples.
-        found: usize,
-        /// Needed.
-        needed: usize,
-    },
-    /// The method's matrix is singular.
-    #[error("the examples do not determine the weights: are they all the same?")]
-    Singular,
-}
 
 /// Tables of one way to enrich one model; never changes.
 #[derive(Debug, Clone)]
@@ -140,38 +111,25 @@ impl Enricher {
         }
     }
 
-    /// Detail that one contact adds, `[n_skin]` \[m\], and how far it is trusted: 0 is the plain coarse skin. `offsets` are those of
-    /// the coarse skin from rest, as [`State::write_padded_offsets`] leaves them.
-    pub fn evaluate(
-        &self,
-        model: &Model,
-        state: &State,
-        offsets: &[Node],
-        touch: &Touch,
-        scratch: &mut EnricherScratch,
-        detail: &mut [Node],
-    ) -> f32 {
-        self.evaluate_within([0.0, 1.0], &state.u[..model.n_free], offsets, touch, scratch, detail).confidence
+    /// Detail that one contact adds, `[n_skin]` \[m\], and its confidence: 0 is the plain coarse skin.
+    pub fn evaluate(&self, contact: &Contact<'_>, scratch: &mut EnricherScratch, detail: &mut [Node]) -> f32 {
+        self.evaluate_within([0.0, 1.0], contact, scratch, detail).confidence
     }
 
     /// The same with bounds for the share that is laid on the skin.
     pub(crate) fn evaluate_within(
         &self,
         bounds: [f32; 2],
-        displacements: &[Node],
-        offsets: &[Node],
-        touch: &Touch,
+        contact: &Contact<'_>,
         scratch: &mut EnricherScratch,
         detail: &mut [Node],
     ) -> Trust {
-        let offsets = Offsets::Padded(offsets);
-        let Some((place, trust)) = self.weigh(bounds, (displacements, offsets), touch, scratch) else {
+        let Some((place, trust)) = self.weigh(bounds, contact, scratch) else {
             detail.fill([0.0; 4]);
             return Trust::NONE;
         };
         let EnricherScratch { layout, weights, field, .. } = scratch;
-        let situation = situation(displacements, offsets, layout, &place, touch);
-        self.field.evaluate(&situation, weights, trust.share, field, detail);
+        self.field.evaluate(&contact.at(&place, layout), weights, trust.share, field, detail);
         trust
     }
 
@@ -184,53 +142,49 @@ impl Enricher {
     pub(crate) fn sample_within(
         &self,
         bounds: [f32; 2],
-        (model, state): (&Model, &State),
-        touch: &Touch,
+        contact: &Contact<'_>,
         scratch: &mut EnricherScratch,
         each: impl FnMut(usize, &[Node; LANES]),
     ) -> Option<Trust> {
-        let displacements = &state.u[..model.n_free];
-        let offsets = Offsets::Between(&state.skin, self.surface.rest());
-        let (place, trust) = self.weigh(bounds, (displacements, offsets), touch, scratch)?;
+        let (place, trust) = self.weigh(bounds, contact, scratch)?;
         let EnricherScratch { layout, weights, field, .. } = scratch;
-        let situation = situation(displacements, offsets, layout, &place, touch);
-        self.field.sample(&situation, weights, trust.share, field, each);
+        self.field.sample(&contact.at(&place, layout), weights, trust.share, field, each);
         Some(trust)
+    }
+
+    /// A contact in a running simulation, whose offsets are deformed less rest positions.
+    pub(crate) fn contact<'a>(&'a self, model: &Model, state: &'a State, touch: &'a Touch) -> Contact<'a> {
+        let offsets = Offsets::Between(&state.skin, self.surface.rest());
+        Contact { displacements: &state.u[..model.n_free], offsets, touch }
     }
 
     /// Lays the skin out around the contact point and weighs the examples; `None` where no chart reaches.
     fn weigh(
         &self,
         [least, most]: [f32; 2],
-        (displacements, offsets): (&[Node], Offsets<'_>),
-        touch: &Touch,
+        contact: &Contact<'_>,
         scratch: &mut EnricherScratch,
     ) -> Option<(Place, Trust)> {
         let EnricherScratch { layout, weights, kernel, .. } = scratch;
-        let place = self.lay_out(touch, layout)?;
-        let situation = situation(displacements, offsets, layout, &place, touch);
-        let mut trust = self.correlation.weigh(&situation, kernel, weights);
+        let place = self.lay_out(contact.touch, layout)?;
+        let mut trust = self.correlation.weigh(&contact.at(&place, layout), kernel, weights);
         trust.share = if self.options.fade { trust.share.clamp(least, most) } else { 1.0 };
         trust.confidence = trust.confidence.min(trust.share);
         Some((place, trust))
     }
 
-    /// Detail with given weights `[n]`, in place of the correlator's: to see what interpolation alone does.
+    /// Detail with given weights `[n]` in place of the correlator's: interpolation alone.
     pub fn interpolate(
         &self,
-        model: &Model,
-        state: &State,
-        offsets: &[Node],
-        (touch, weights): (&Touch, &[f32]),
+        contact: &Contact<'_>,
+        weights: &[f32],
         scratch: &mut EnricherScratch,
         detail: &mut [Node],
     ) {
         let EnricherScratch { layout, field, .. } = scratch;
         detail.fill([0.0; 4]);
-        if let Some(place) = self.lay_out(touch, layout) {
-            let displacements = &state.u[..model.n_free];
-            let situation = situation(displacements, Offsets::Padded(offsets), layout, &place, touch);
-            self.field.evaluate(&situation, weights, 1.0, field, detail);
+        if let Some(place) = self.lay_out(contact.touch, layout) {
+            self.field.evaluate(&contact.at(&place, layout), weights, 1.0, field, detail);
         }
     }
 
@@ -263,25 +217,5 @@ impl Enricher {
     /// Whether it was made for such a model.
     pub fn fits(&self, model: &Model) -> bool {
         self.n_nodes == model.n_nodes() && self.surface.n_vertices() == model.n_skin()
-    }
-}
-
-/// What is seen of a contact.
-pub(crate) fn situation<'a>(
-    displacements: &'a [Node],
-    offsets: Offsets<'a>,
-    layout: &'a [[F; 2]],
-    place: &Place,
-    touch: &Touch,
-) -> Situation<'a> {
-    let frame = &place.frame;
-    let rows = [frame.tau.transpose(), frame.theta.transpose(), frame.normal.transpose()];
-    Situation {
-        displacements,
-        offsets,
-        layout,
-        contact_point: place.point.position.coords.cast(),
-        frame: Matrix3::from_rows(&rows).cast(),
-        tool_origin: touch.tool_origin.coords.cast(),
     }
 }

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use super::charts::{Charts, FAR};
-use super::enricher::{EnricherError, situation};
-use super::situation::{Offsets, Situation, Touch};
+use super::error::EnricherError;
+use super::situation::{Contact, Offsets, Situation, Touch};
 use super::surface::{Place, Surface};
 use crate::lanes::{F, Node};
 use crate::model::Model;
@@ -63,8 +63,9 @@ impl SeenExamples {
 
     pub(crate) fn situations(&self) -> Vec<Situation<'_>> {
         let of_example = |i: usize| {
-            let (u, offsets, layout) = (&self.displacements[i], &self.offsets[i], &self.layouts[i]);
-            situation(u, Offsets::Padded(offsets), layout, &self.places[i], &self.touches[i])
+            let (displacements, touch) = (&self.displacements[i][..], &self.touches[i]);
+            let contact = Contact { displacements, offsets: Offsets::Padded(&self.offsets[i]), touch };
+            contact.at(&self.places[i], &self.layouts[i])
         };
         (0..self.places.len()).map(of_example).collect()
     }

@@ -1,6 +1,6 @@
 //! From how new a state is to how much its detail is trusted.
 
-/// What a correlator thinks of its weights.
+/// Trust of a correlator in its weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Trust {
     /// How much of the detail is laid on the skin: between 0 and 1.
@@ -10,7 +10,7 @@ pub(crate) struct Trust {
 }
 
 impl Trust {
-    /// Knows no doubt.
+    /// Full trust.
     pub(crate) const FULL: Self = Self { share: 1.0, confidence: 1.0 };
     /// Nothing to lay on the skin.
     pub(crate) const NONE: Self = Self { share: 0.0, confidence: 0.0 };
@@ -24,8 +24,7 @@ pub(crate) struct Fade {
 }
 
 impl Fade {
-    /// All of the detail up to twice what the newest example would have been to the others, none half-way from there to a state
-    /// that no example tells anything about.
+    /// Full share up to twice the largest leave-one-out novelty; zero half-way between that and 1.
     pub(crate) fn after(novelties: &[f64]) -> Self {
         let newest = novelties.iter().copied().fold(0.0, f64::max);
         let begin = (2.0 * newest).min(0.5);
@@ -43,4 +42,10 @@ impl Fade {
 pub(crate) fn smoothstep(x: f32) -> f32 {
     let x = x.clamp(0.0, 1.0);
     x * x * (3.0 - 2.0 * x)
+}
+
+/// `W`: 1 up to the first share of the radius, 0 from the second on.
+#[inline(always)]
+pub(crate) fn window([inner, outer]: [f64; 2], share: f32) -> f32 {
+    1.0 - smoothstep((share - inner as f32) / (outer - inner) as f32)
 }

@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, Matrix3, Vector2, Vector3};
 use plica_geometry::ReferenceSkin;
 use wide::f32x4;
 
-use super::fade::smoothstep;
+use super::fade::window;
 use super::groups::Groups;
 use super::lattice::{Lattice, Pair, put};
 use super::modes::{Modes, Precision, gram};
@@ -306,12 +306,6 @@ impl Field {
         [&self.stamps, &self.vectors].into_iter().flatten().map(Modes::bytes).sum::<usize>()
             + self.warp.as_ref().map_or(0, Warp::bytes)
     }
-}
-
-/// `W`: 1 up to the first share of the radius, 0 from the second on.
-#[inline(always)]
-pub(crate) fn window([inner, outer]: [f64; 2], share: f32) -> f32 {
-    1.0 - smoothstep((share - inner as f32) / (outer - inner) as f32)
 }
 
 /// Axis after axis, each filled up to whole groups.

@@ -11,7 +11,7 @@ use wide::f32x4;
 use super::clearance::keep_clear;
 use super::enricher::{Enricher, EnricherScratch};
 use super::fade::Trust;
-use super::situation::{Touch, vector};
+use super::situation::{Contact, Touch, vector};
 use crate::contact::V3;
 use crate::lanes::{LANES, Node};
 use crate::model::Model;
@@ -118,7 +118,7 @@ impl LiveEnrichment {
     pub fn follow(&mut self, model: &Model, state: &State) {
         let step = model.timestep_s() as f32 / HAND_OVER_S;
         let jump = JUMP_CELLS * f64::from(model.cell_size);
-        let is_alone = self.windows().count() == 0;
+        let is_alone = self.n_windows() == 0;
         for (tool, reading) in state.tools().iter().enumerate() {
             let windows = &mut self.tools[tool];
             if let Some(current) = &mut windows.current {
@@ -136,9 +136,13 @@ impl LiveEnrichment {
         }
     }
 
+    fn n_windows(&self) -> usize {
+        self.tools.iter().flat_map(ToolWindows::windows).count()
+    }
+
     /// Writes the enriched skin, `[n_skin]` \[m\], world axes.
     pub fn write_skin(&mut self, model: &Model, state: &State, out: &mut [[f32; 3]]) {
-        let n_windows = self.windows().count();
+        let n_windows = self.n_windows();
         if n_windows == 0 {
             state.write_skin(model, out);
             return;
@@ -154,25 +158,9 @@ impl LiveEnrichment {
         }
     }
 
-    fn windows(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..2 * self.tools.len()).filter(|slot| self.tools[slot / 2].slot(*slot).is_some())
-    }
-
-    /// Evaluates the window in a slot into `detail`; its gain.
-    fn lay(&mut self, slot: usize, model: &Model, state: &State, detail: &mut [Node]) -> f32 {
-        let Some(window) = self.tools[slot / 2].slot_mut(slot) else { return 0.0 };
-        let bounds = window.share_bounds(state.tick(), model.timestep_s() as f32 / HAND_OVER_S);
-        let displacements = &state.u[..model.n_free];
-        let (touch, offsets, scratch) = (&window.touch, &self.offsets, &mut self.scratch);
-        let trust = self.enricher.evaluate_within(bounds, displacements, offsets, touch, scratch, detail);
-        window.laid = Some((trust, state.tick()));
-        window.gain
-    }
-
     /// The skin with a single window's detail, in one pass; the largest detail \[m\].
     fn write_one(&mut self, model: &Model, state: &State, out: &mut [[f32; 3]]) -> f32 {
-        let Some(slot) = self.windows().next() else { return 0.0 };
-        let Some(window) = self.tools[slot / 2].slot_mut(slot) else { return 0.0 };
+        let Some(window) = self.tools.iter_mut().flat_map(ToolWindows::windows_mut).next() else { return 0.0 };
         let bounds = window.share_bounds(state.tick(), model.timestep_s() as f32 / HAND_OVER_S);
         let (mut largest, gain) = (f32x4::ZERO, f32x4::splat(window.gain));
         let write = |group: usize, detail: &[Node; LANES]| {
@@ -184,7 +172,8 @@ impl LiveEnrichment {
                 largest = largest.fast_max(detail.abs());
             }
         };
-        let trust = self.enricher.sample_within(bounds, (model, state), &window.touch, &mut self.scratch, write);
+        let contact = self.enricher.contact(model, state, &window.touch);
+        let trust = self.enricher.sample_within(bounds, &contact, &mut self.scratch, write);
         window.laid = Some((trust.unwrap_or(Trust::NONE), state.tick()));
         if trust.is_none() {
             state.write_skin(model, out);
@@ -208,26 +197,26 @@ impl LiveEnrichment {
     /// `d = min(1, sum_a g_a) sum_a g_a h_a d_a / sum_a g_a h_a` with gains `g` and closeness `h`: windows come and go without a
     /// jump.
     fn lay_all(&mut self, model: &Model, state: &State) {
-        self.total.fill([0.0; 4]);
-        self.shares.fill(0.0);
+        let Self { enricher, scratch, tools, offsets, detail, shares, total } = self;
+        total.fill([0.0; 4]);
+        shares.fill(0.0);
         let mut gains = 0.0;
-        let mut detail = std::mem::take(&mut self.detail);
-        for slot in 0..2 * self.tools.len() {
-            if self.tools[slot / 2].slot(slot).is_none() {
-                continue;
-            }
-            let gain = self.lay(slot, model, state, &mut detail);
+        for window in tools.iter_mut().flat_map(ToolWindows::windows_mut) {
+            let bounds = window.share_bounds(state.tick(), model.timestep_s() as f32 / HAND_OVER_S);
+            let contact = Contact::new(model, state, offsets, &window.touch);
+            let trust = enricher.evaluate_within(bounds, &contact, scratch, detail);
+            window.laid = Some((trust, state.tick()));
+            let gain = window.gain;
             gains += gain;
-            let sums = self.total.iter_mut().zip(&mut self.shares).zip(&detail);
+            let sums = total.iter_mut().zip(&mut *shares).zip(&*detail);
             for (vertex, ((total, sum), detail)) in sums.enumerate() {
-                let closeness = self.enricher.closeness(&self.scratch, vertex).max(LEAST_CLOSENESS);
+                let closeness = enricher.closeness(scratch, vertex).max(LEAST_CLOSENESS);
                 (0..3).for_each(|k| total[k] += gain * closeness * detail[k]);
                 *sum += gain * closeness;
             }
         }
-        self.detail = detail;
         let all = gains.min(1.0);
-        for (total, sum) in self.total.iter_mut().zip(&self.shares) {
+        for (total, sum) in total.iter_mut().zip(&*shares) {
             *total = total.map(|c| all * c / sum.max(f32::MIN_POSITIVE));
         }
     }
@@ -248,13 +237,12 @@ impl Window {
 }
 
 impl ToolWindows {
-    /// Even slots hold present windows, odd ones those that leave.
-    fn slot(&self, slot: usize) -> Option<&Window> {
-        if slot.is_multiple_of(2) { self.current.as_ref() } else { self.leaving.as_ref() }
+    fn windows(&self) -> impl Iterator<Item = &Window> {
+        self.current.iter().chain(&self.leaving)
     }
 
-    fn slot_mut(&mut self, slot: usize) -> Option<&mut Window> {
-        if slot.is_multiple_of(2) { self.current.as_mut() } else { self.leaving.as_mut() }
+    fn windows_mut(&mut self) -> impl Iterator<Item = &mut Window> {
+        self.current.iter_mut().chain(&mut self.leaving)
     }
 
     fn confidence(&self) -> f32 {

@@ -3,8 +3,11 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::groups::Planar;
+use super::surface::Place;
 use crate::embedding::SkinPositions;
 use crate::lanes::{F, LANES, Node};
+use crate::model::Model;
+use crate::state::State;
 
 /// Where a tool touches.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,6 +53,37 @@ impl Offsets<'_> {
                     std::array::from_fn(|k| (deformed.group(k, group) - rest.axis(k)[group]).to_array());
                 std::array::from_fn(|lane| [x[lane], y[lane], z[lane], 0.0])
             }
+        }
+    }
+}
+
+/// One contact as an enricher is asked about it: the coarse state, and where a tool touches.
+#[derive(Debug, Clone, Copy)]
+pub struct Contact<'a> {
+    /// Displacements of free nodes, in internal order \[m\].
+    pub(crate) displacements: &'a [Node],
+    pub(crate) offsets: Offsets<'a>,
+    pub(crate) touch: &'a Touch,
+}
+
+impl<'a> Contact<'a> {
+    /// `offsets` are those of the coarse skin from rest, as [`State::write_padded_offsets`] leaves them.
+    pub fn new(model: &Model, state: &'a State, offsets: &'a [Node], touch: &'a Touch) -> Self {
+        Self { displacements: &state.u[..model.n_free], offsets: Offsets::Padded(offsets), touch }
+    }
+
+    /// The contact with the skin laid out around its place.
+    #[inline(always)]
+    pub(crate) fn at(&self, place: &Place, layout: &'a [[F; 2]]) -> Situation<'a> {
+        let frame = &place.frame;
+        let rows = [frame.tau.transpose(), frame.theta.transpose(), frame.normal.transpose()];
+        Situation {
+            displacements: self.displacements,
+            offsets: self.offsets,
+            layout,
+            contact_point: place.point.position.coords.cast(),
+            frame: Matrix3::from_rows(&rows).cast(),
+            tool_origin: self.touch.tool_origin.coords.cast(),
         }
     }
 }

@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 use plica_geometry::Skin;
 use wide::f32x4;
 
-use super::field::window;
+use super::fade::window;
 use super::lattice::is_torn;
 use super::situation::Situation;
 use crate::lanes::Node;

@@ -130,7 +130,7 @@ impl Bench {
     /// Detail of the present state for a touch.
     pub fn enrich_at(&mut self, touch: &Touch) -> f32 {
         let Self { enricher, model, state, scratch, offsets, detail, .. } = self;
-        enricher.evaluate(model, state, offsets, touch, scratch, detail)
+        enricher.evaluate(&Contact::new(model, state, offsets, touch), scratch, detail)
     }
 
     /// Detail of the `i`-th example alone, at its own place.
@@ -139,7 +139,7 @@ impl Bench {
         let mut weights = vec![0.0; presses.len()];
         weights[i] = 1.0;
         let Self { enricher, model, state, scratch, offsets, detail, .. } = self;
-        enricher.interpolate(model, state, offsets, (&presses[i].touch, &weights), scratch, detail);
+        enricher.interpolate(&Contact::new(model, state, offsets, &presses[i].touch), &weights, scratch, detail);
     }
 
     /// Distance of the detail from what it should be, at each vertex [m].

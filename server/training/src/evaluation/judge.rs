@@ -11,10 +11,8 @@ use super::prepared::{Outcome, Prepared};
 use super::verdict::{Judged, Verdict};
 use crate::database::Database;
 use crate::obstacle::radius_m;
-use crate::setup::Setup;
+use crate::setup::{IN_REGION, Setup};
 
-/// Kind of the states that are drawn as training draws.
-pub const IN_REGION: &str = "in_region";
 /// Name of the skin without enrichment.
 pub const COARSE: &str = "coarse";
 /// States that the coarse skin misses by less are left out \[m\].
@@ -48,6 +46,9 @@ pub enum EvaluationError {
         /// The scene's.
         expected: usize,
     },
+    /// The observer broke off.
+    #[error("interrupted")]
+    Interrupted,
     /// There is nothing to judge by.
     #[error(
         "none of {n} held-out examples lies in the trained region and has detail of {least_mm} mm or more",

@@ -5,7 +5,6 @@ use plica_geometry::ReferenceSkin;
 use plica_sim::{Model, State};
 use rayon::prelude::*;
 
-use super::judge::IN_REGION;
 use super::measure::Patch;
 use super::statistics::Quantiles;
 use crate::coarse::Cancelled;
@@ -14,7 +13,7 @@ use crate::error::TrainingError;
 use crate::example::{Example, to_f32};
 use crate::interaction::Interaction;
 use crate::plan::plan;
-use crate::setup::Setup;
+use crate::setup::{IN_REGION, Setup};
 use crate::tandem::{Stop, Tandem};
 
 /// How far another coarse model is from the accurate one.

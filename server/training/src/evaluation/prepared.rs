@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use nalgebra::Vector3;
-use plica_sim::enrichment::{Enricher, EnricherScratch, Touch};
+use plica_sim::enrichment::{Contact, Enricher, EnricherScratch, Touch};
 use plica_sim::{Model, State};
 
 /// What a method makes of one state.
@@ -70,6 +70,6 @@ impl<'a> Prepared<'a> {
 
     fn step(&mut self, touch: &Touch) -> f64 {
         let Self { enricher, model, state, offsets, scratch, detail, .. } = self;
-        enricher.evaluate(model, state, offsets, touch, scratch, detail).into()
+        enricher.evaluate(&Contact::new(model, state, offsets, touch), scratch, detail).into()
     }
 }

@@ -1,10 +1,14 @@
 //! All methods on the same held-out states.
 
+use std::ops::ControlFlow;
+
+use plica_sim::enrichment::DEFAULT_METHOD;
 use serde::{Deserialize, Serialize};
 
 use super::degenerate::Degenerate;
 use super::judge::{EvaluationError, Judge};
-use super::methods::{DEFAULT_METHOD, Method};
+use super::methods::Method;
+use super::progress::{Observer, Progress};
 use super::slide::Slide;
 use super::verdict::Verdict;
 
@@ -24,7 +28,7 @@ pub struct Evaluation {
     pub by_examples: Vec<Verdict>,
     /// Along a slide, if it was asked for.
     pub slide: Option<Slide>,
-    /// Name of the way that enrichment goes unless told otherwise.
+    /// Name of the default method.
     pub default: String,
 }
 
@@ -49,9 +53,6 @@ pub struct Judgement {
     pub degenerate: Option<Degenerate>,
 }
 
-/// Told before each part of the work: parts done, parts in all, what comes.
-pub type Told<'a> = &'a dyn Fn(usize, usize, &str);
-
 /// Judges `methods` with the first `n_examples` examples, and some of them with fewer.
 ///
 /// # Errors
@@ -60,22 +61,26 @@ pub fn evaluate(
     judge: &Judge,
     methods: &[Method],
     n_examples: usize,
-    told: Told<'_>,
+    observer: &mut Observer<'_>,
 ) -> Result<Evaluation, EvaluationError> {
     let n_examples = n_examples.min(judge.n_examples());
     let with_fewer = methods.iter().filter(|m| WITH_FEWER.contains(&m.name.as_str()));
     let counts = EXAMPLE_COUNTS.into_iter().filter(|n| *n <= n_examples);
     let fewer: Vec<(&Method, usize)> = with_fewer.flat_map(|m| counts.clone().map(move |n| (m, n))).collect();
     let n_parts = methods.len() + fewer.len();
+    let mut begin = |done, part: &str| match observer(Progress { done, all: n_parts, part }) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(EvaluationError::Interrupted),
+    };
     let mut all = vec![Judgement { verdict: judge.coarse()?, degenerate: None }];
     for (done, method) in methods.iter().enumerate() {
-        told(done, n_parts, &method.name);
+        begin(done, &method.name)?;
         let verdict = judge.judge(method, n_examples)?;
         all.push(Judgement { verdict, degenerate: Some(judge.degenerate(method, n_examples)?) });
     }
     let mut by_examples = Vec::new();
     for (done, (method, n)) in fewer.into_iter().enumerate() {
-        told(methods.len() + done, n_parts, &format!("{} with {n} examples", method.name));
+        begin(methods.len() + done, &format!("{} with {n} examples", method.name))?;
         by_examples.push(judge.judge(method, n)?);
     }
     let [in_region, outside] = judge.n_states();

@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use super::judge::{EvaluationError, Judge};
 use super::methods::Method;
-use super::report::Told;
+use super::progress::{Observer, Progress};
 use super::statistics::Quantiles;
-use crate::coarse::Cancelled;
+use crate::coarse::Interrupted;
 use crate::error::TrainingError;
 use crate::example::{difference, to_f32};
 use crate::obstacle::obstacle;
@@ -96,7 +96,7 @@ pub fn slide(
     judge: &Judge,
     methods: &[Method],
     n_examples: usize,
-    (told, cancelled): (Told<'_>, Cancelled<'_>),
+    observer: &mut Observer<'_>,
 ) -> Result<Slide, SlideError> {
     let (tool, poses) = poses(setup)?;
     let mut stations: Vec<Option<Station>> = Vec::new();
@@ -107,8 +107,10 @@ pub fn slide(
         tool,
         &poses,
         |tandem, half| {
-            told(stations.len(), poses.len(), "slides");
-            let tied = half.as_ref().map(|half| tandem.solve_tied(half, cancelled));
+            if observer(Progress { done: stations.len(), all: poses.len(), part: "slide" }).is_break() {
+                return Err(Interrupted);
+            }
+            let tied = half.as_ref().map(|half| tandem.solve_tied(half, &|| false));
             if let Some(Err(stop)) = &tied {
                 rejected += 1;
                 first_rejection.get_or_insert_with(|| stop.to_string());
@@ -123,12 +125,9 @@ pub fn slide(
             }));
             Ok(())
         },
-        cancelled,
+        &|| false,
     );
     walked.map_err(interrupted)?;
-    if cancelled() {
-        return Err(interrupted(crate::coarse::Interrupted));
-    }
     let accurate: Vec<_> = stations.iter().map(|s| s.as_ref().map(|s| s.tied.clone())).collect();
     let mut found = Slide {
         states: accurate.iter().flatten().count(),
@@ -139,7 +138,10 @@ pub fn slide(
         methods: Vec::new(),
     };
     for (done, method) in methods.iter().enumerate() {
-        told(done, methods.len(), &format!("{} along the slide", method.name));
+        let part = format!("{} along the slide", method.name);
+        if observer(Progress { done, all: methods.len(), part: &part }).is_break() {
+            return Err(interrupted(Interrupted));
+        }
         let mut prepared = judge.prepare(method, &judge.examples(n_examples))?;
         let mut detail = |s: &Station| prepared.evaluate(&s.displacements, 1.0, &s.touch).0.to_vec();
         let details: Vec<_> = stations.iter().map(|s| s.as_ref().map(&mut detail)).collect();

@@ -23,7 +23,7 @@ impl Quantiles {
     }
 }
 
-/// Between the two values that a share of sorted ones falls between.
+/// Linear interpolation between the two order statistics next to `share`.
 pub(super) fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let place = share * sorted.len().checked_sub(1)? as f64;
     let (below, above) = (sorted[place.floor() as usize], sorted[place.ceil() as usize]);

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::IN_REGION;
 use super::measure::{Group, Measure};
 use super::statistics::{quantile, rank_correlation};
+use crate::setup::IN_REGION;
 
 /// What a method makes of all states.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -65,7 +65,7 @@ fn row(v: &Verdict, default: &str) {
 
 fn kinds(v: &Verdict) {
     let of_kind = |(kind, group): (&String, &Group)| format!("{kind} {}", ratios(group));
-    let outside = v.kinds.iter().filter(|(kind, _)| *kind != plica_training::evaluation::IN_REGION);
+    let outside = v.kinds.iter().filter(|(kind, _)| *kind != plica_training::IN_REGION);
     println!("{:<27} {}", v.name, outside.map(of_kind).collect::<Vec<_>>().join("  "));
 }
 

@@ -2,7 +2,7 @@
 
 #![allow(rustdoc::broken_intra_doc_links, reason = "units in brackets; the schema shows this text as it is")]
 
-use plica_sim::enrichment::EnrichmentOptions;
+use plica_sim::enrichment::DEFAULT_METHOD;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -13,43 +13,24 @@ pub struct RawEnrichment {
     /// Examples to start with, as `plicad train` leaves them: path relative to the scene file. Left out: the plain coarse skin
     /// until a database is activated.
     pub database: Option<String>,
-    /// How the present state is compared with the examples.
-    pub method: RawEnrichmentMethod,
-    /// How their detail is laid on the skin.
-    pub interpolation: RawInterpolation,
-    /// Coordinates around a contact point.
-    pub coordinates: RawCoordinates,
+    /// Name of a method, as `plicad evaluate` measures it: `kriging-stamp` (the default), `kriging-blend`, `ssh12-vector`, `rescale`,
+    /// ...; an unknown name lists all. Or its family alone: `kriging`, `ssh12`, `linear`, `ridge`, `harmonic`, `rbf`, `rescale`.
+    pub method: String,
+    /// Interpolation of a family. Left out: stamps; vectors for the families that are measured with vectors only.
+    pub interpolation: Option<RawInterpolation>,
+    /// Coordinates around a contact point. Left out, like all keys below: those of the method.
+    pub coordinates: Option<RawCoordinates>,
     /// Radius of the chart around a contact point, in coarse cells.
     #[schemars(range(min = 0.5, max = 64.0))]
-    pub radius_cells: f64,
+    pub radius_cells: Option<f64>,
     /// Texels of a stamp per side.
     #[schemars(range(min = 8, max = 256))]
-    pub texels: u32,
+    pub texels: Option<u32>,
     /// Modes that the examples' detail is reduced to; as many as examples or more keep the examples.
     #[schemars(range(min = 1, max = 100_000))]
-    pub modes: u32,
-    /// Whether detail that the examples do not cover fades to the coarse skin. Of `kriging` only; `ssh12` always does.
-    pub fade: bool,
-}
-
-/// How the present state is compared with the examples.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum RawEnrichmentMethod {
-    /// Gaussian-process weights on the coarse skin around the contact point.
-    Kriging,
-    /// The paper's: likeness of the displacement vectors.
-    Ssh12,
-    /// Linear regression.
-    Linear,
-    /// Ridge regression.
-    Ridge,
-    /// Linear with harmonic regularisation.
-    Harmonic,
-    /// The position of the tool.
-    Rbf,
-    /// Not at all: the coarse dent is rescaled by what the examples say on average.
-    Rescale,
+    pub modes: Option<u32>,
+    /// Whether detail that the examples do not cover fades to the coarse skin.
+    pub fade: Option<bool>,
 }
 
 /// How detail is laid on the skin.
@@ -78,16 +59,15 @@ pub enum RawCoordinates {
 
 impl Default for RawEnrichment {
     fn default() -> Self {
-        let d = EnrichmentOptions::default();
         Self {
             database: None,
-            method: RawEnrichmentMethod::Kriging,
-            interpolation: RawInterpolation::Stamp,
-            coordinates: RawCoordinates::Exponential,
-            radius_cells: d.radius_cells,
-            texels: d.field.texels as u32,
-            modes: d.field.modes as u32,
-            fade: d.fade,
+            method: DEFAULT_METHOD.to_owned(),
+            interpolation: None,
+            coordinates: None,
+            radius_cells: None,
+            texels: None,
+            modes: None,
+            fade: None,
         }
     }
 }

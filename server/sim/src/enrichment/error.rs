@@ -1,0 +1,29 @@
+//! Why a method cannot be prepared.
+
+/// Why there is no enricher.
+#[derive(Debug, thiserror::Error)]
+pub enum EnricherError {
+    /// An array of the examples has another length than the model or the other arrays.
+    #[error("example {example} has {found} {what}, {expected} are needed")]
+    Length {
+        /// The example.
+        example: usize,
+        /// Which array.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length it should have.
+        expected: usize,
+    },
+    /// Fewer examples than the method needs.
+    #[error("{found} examples, at least {needed} are needed")]
+    TooFew {
+        /// Examples.
+        found: usize,
+        /// Needed.
+        needed: usize,
+    },
+    /// The method's matrix is singular.
+    #[error("the examples do not determine the weights: are they all the same?")]
+    Singular,
+}
