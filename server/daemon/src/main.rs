@@ -27,7 +27,7 @@ fn main() -> ExitCode {
 /// A job that was asked to stop is not one that failed.
 fn exit_code(error: &anyhow::Error) -> ExitCode {
     match error.downcast_ref() {
-        Some(plica_training::TrainingError::Interrupted) => ExitCode::from(plicad::commands::train::INTERRUPTED),
+        Some(plica_training::TrainingError::Interrupted) => ExitCode::from(plica_training::INTERRUPTED),
         _ => ExitCode::FAILURE,
     }
 }

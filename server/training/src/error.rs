@@ -104,6 +104,9 @@ pub enum TrainingError {
     },
 }
 
+/// Exit code of a process that ends with [`TrainingError::Interrupted`].
+pub const INTERRUPTED: u8 = 75;
+
 /// What to do about a full disk.
 fn advice(error: &std::io::Error) -> &'static str {
     match error.kind() {

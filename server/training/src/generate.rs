@@ -57,7 +57,7 @@ pub fn run(
     let sizes = work.run(n_threads, folder, watch, &tally)?;
     tell(folder, watch, &Progress { stage: Stage::Database, seconds_left: Some(0.0), ..tally.now() })?;
     let database = assemble(folder, &about, &fingerprints)?;
-    let path = folder.database();
+    let path = folder.paths().database();
     let nothing = || PlanError::AllRejected { n: database.rejected.len(), first: first_message(&database) };
     if database.examples.is_empty() {
         return Err(nothing().into());
@@ -144,7 +144,7 @@ fn assemble(folder: &Folder, about: &About, fingerprints: &[String]) -> Result<D
             Some(Outcome::Rejected(rejection)) => database.rejected.push(rejection),
             None => {
                 let problem = format!("interaction {index} was finished and is gone or damaged; run the job again");
-                return Err(TrainingError::File { path: folder.path().to_owned(), problem });
+                return Err(TrainingError::File { path: folder.paths().root().to_owned(), problem });
             }
         }
     }

@@ -6,6 +6,7 @@
 //! same, bit for bit.
 
 mod accurate;
+mod atomic_file;
 mod band;
 mod canonical;
 mod coarse;
@@ -15,10 +16,11 @@ pub mod evaluation;
 mod example;
 mod examples_of;
 mod farthest;
-mod files;
 mod folder;
 mod generate;
+mod host;
 mod interaction;
+mod job_folder;
 mod lift;
 mod obstacle;
 mod plan;
@@ -31,18 +33,20 @@ mod tandem;
 mod way;
 
 pub use accurate::{Accurate, AccurateFailure, AccurateResult, SolveInfo};
-pub use canonical::{fingerprint, to_text};
+pub use atomic_file::{sync_folder, write_atomically, write_json_atomically};
+pub use canonical::{fingerprint, hexadecimal, to_text};
 pub use coarse::{Cancelled, Coarse, CoarseResult, Interrupted, Settling};
 pub use database::{
     About, CONTACT_POINT, Database, DatabaseError, FORMAT, FORMAT_VERSION, JobKind, METADATA_KEY, SOLVER_VERSION,
     TANDEM_VERSION, versions,
 };
-pub use error::{BuildError, PlanError, TrainingError};
+pub use error::{BuildError, INTERRUPTED, PlanError, TrainingError};
 pub use example::{Example, Outcome, Reason, Record, Rejection, SettlingRecord};
-pub use files::write_atomically;
 pub use folder::{Folder, Job, Progress, Stage};
 pub use generate::{Watch, run};
+pub use host::{default_threads, now_unix_s};
 pub use interaction::{Action, Interaction};
+pub use job_folder::{JobPaths, Writer};
 pub use plan::plan;
 pub use random::GENERATOR;
 pub use report::{Report, Run, Solves, Spread, Summary, largest, rms};

@@ -8,7 +8,7 @@ mod watch;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use plica_training::{Folder, Job, JobKind, Report, write_atomically};
+use plica_training::{Folder, Job, JobKind, Report, default_threads, write_atomically};
 
 use crate::cli::{TrainArgs, TrainKind};
 use crate::config::Config;
@@ -16,9 +16,6 @@ use crate::training::{JobRequest, make, setup};
 use watch::{Ending, ToLog};
 
 pub(super) use watch::OnTerminal;
-
-/// Exit code of a job that was asked to stop, and did: what is finished is kept.
-pub const INTERRUPTED: u8 = 75;
 
 /// Trains, or says how firm the accurate skin is.
 pub fn run(args: &TrainArgs, json: bool) -> anyhow::Result<()> {
@@ -34,12 +31,6 @@ pub fn run(args: &TrainArgs, json: bool) -> anyhow::Result<()> {
         }
         (None, None) => anyhow::bail!("name a scene, or a job's folder with --job"),
     }
-}
-
-/// All cores but one: somebody may be simulating.
-fn default_threads() -> u32 {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    u32::try_from(cores.saturating_sub(1)).unwrap_or(1).max(1)
 }
 
 /// A job by hand: makes its folder, shows a bar, prints a table.
@@ -62,11 +53,12 @@ fn run_scene(config: &Config, args: &TrainArgs, n_threads: u32, json: bool) -> a
     }
     let report = result?;
     if let Some(out) = &args.out {
-        copy(&folder.database(), out)?;
+        copy(&folder.paths().database(), out)?;
     }
-    table::print(&report, args.out.as_deref().unwrap_or(&folder.database()), &folder.report());
+    let database = args.out.clone().unwrap_or_else(|| folder.paths().database());
+    table::print(&report, &database, &folder.paths().report());
     if json {
-        println!("{}", summary(&report, args.out.as_deref().unwrap_or(&folder.database()), &root)?);
+        println!("{}", summary(&report, &database, &root)?);
     }
     Ok(())
 }
@@ -77,13 +69,13 @@ fn run_job(root: &Path, threads: Option<u32>, json: bool) -> anyhow::Result<()> 
     anyhow::ensure!(root.is_dir(), "{}: is no job folder: there is no such folder", root.display());
     let folder = Folder::open(root)?;
     let job = folder.job()?;
-    let config = Config::from_file(&root.join("scene.toml"))?;
+    let config = Config::from_file(&folder.paths().scene())?;
     let n_threads = threads.or(job.threads).unwrap_or_else(default_threads);
     let watch = ToLog::new(ending, job.kind.name());
     let report = work(&config, &job, &folder, n_threads as usize, &watch)?;
     watch.done(&report);
     if json {
-        println!("{}", summary(&report, &folder.database(), root)?);
+        println!("{}", summary(&report, &folder.paths().database(), root)?);
     }
     Ok(())
 }
@@ -100,7 +92,8 @@ pub(super) fn work(
     Ok(plica_training::run(&setup, job, n_threads, folder, watch)?)
 }
 
-fn default_folder(config: &Config, kind: JobKind) -> PathBuf {
+/// Folder of a job by hand, unless another one is named.
+pub(super) fn default_folder(config: &Config, kind: JobKind) -> PathBuf {
     Path::new("out/train").join(format!("{}-{}", config.name(), kind.name()))
 }
 

@@ -6,7 +6,6 @@
 mod data_folder;
 mod error;
 mod fetch;
-mod files;
 mod folder;
 mod priority;
 mod process;
@@ -21,13 +20,13 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use plica_protocol::chunk::ChunkHeader;
 use plica_protocol::jobs::{
     Job, JobFetchRequest, JobFile, JobListReply, JobState, JobStatus, JobSubmitReply, JobSubmitRequest, MAX_IN_STATUS,
 };
 use plica_protocol::rpc::ErrorReply;
+use plica_training::now_unix_s;
 
 pub use data_folder::{DataFolder, DataFolderError, default_path};
 pub use error::JobError;
@@ -197,9 +196,4 @@ impl Drop for Supervision {
         // A panic in the thread has been reported by itself.
         let _ = self.thread.take().map(JoinHandle::join);
     }
-}
-
-/// Seconds since 1970.
-fn now_unix_s() -> u64 {
-    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs())
 }

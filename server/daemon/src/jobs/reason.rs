@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::ExitStatus;
 
 /// Exit code of a process that was asked to stop, and did.
-const INTERRUPTED: i32 = crate::commands::train::INTERRUPTED as i32;
+const INTERRUPTED: i32 = plica_training::INTERRUPTED as i32;
 /// Exit code of a Rust program that panicked.
 const PANICKED: i32 = 101;
 /// With less room than this a disk counts as full.

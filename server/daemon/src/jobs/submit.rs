@@ -2,18 +2,16 @@
 
 use std::fs;
 use std::io;
-use std::num::NonZero;
 use std::path::Path;
 
 use plica_protocol::jobs::{JobSubmitReply, JobSubmitRequest};
-use plica_training::Job as Order;
+use plica_training::{Job as Order, default_threads, now_unix_s, sync_folder};
 
-use super::files::sync_folder;
+use super::JobError;
 use super::folder::{JobFolder, Standing};
 use super::recover::SUBMITTING;
 use super::scene::{JobScene, ServedScene};
 use super::store::{Entry, Store};
-use super::{JobError, now_unix_s};
 use crate::wire;
 
 /// Jobs that may wait.
@@ -68,15 +66,9 @@ fn order(request: &JobSubmitRequest, scene: &JobScene, id: String) -> Order {
         scene_name: scene.name.clone(),
         examples: request.examples,
         seed: request.seed,
-        threads: request.threads.or_else(default_threads),
+        threads: request.threads.or_else(|| Some(default_threads())),
         submitted_unix_s: now_unix_s(),
     }
-}
-
-/// All cores but one, which the simulation needs.
-fn default_threads() -> Option<u32> {
-    let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
-    u32::try_from(cores.saturating_sub(1).max(1)).ok()
 }
 
 /// Makes the folder beside its place and moves it there: it is complete, or not there.
@@ -95,7 +87,7 @@ fn fill(folder: &JobFolder, scene: &JobScene, order: &Order, standing: &Standing
         fs::remove_dir_all(folder.path())?;
     }
     fs::create_dir(folder.path())?;
-    scene.write(folder.path())?;
+    scene.write(folder.paths())?;
     folder.write_standing(standing)?;
     folder.write_job(order)
 }

@@ -11,9 +11,9 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
 use plica_protocol::jobs::{JobFile, JobState};
+use plica_training::now_unix_s;
 
 use super::folder::{JobFolder, Standing};
-use super::now_unix_s;
 use super::process::{Launch, Process};
 use super::reason::reason;
 use super::store::Store;

@@ -2,9 +2,8 @@
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};
-use std::time::{SystemTime, UNIX_EPOCH};
 
-use plica_training::{Folder, Job, JobKind, TrainingError, write_atomically};
+use plica_training::{Folder, Job, JobKind, TrainingError, Writer, now_unix_s, write_atomically};
 
 use crate::config::{Config, SceneFile};
 
@@ -43,7 +42,7 @@ pub enum FolderError {
 /// See [`FolderError`].
 pub fn make(root: &Path, config: &Config, request: &JobRequest) -> Result<(Folder, Job), FolderError> {
     let folder = Folder::open(root)?;
-    let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    folder.paths().sweep(Writer::Submitter).map_err(|source| FolderError::Io { path: root.to_owned(), source })?;
     let id = format!("{}-{}", config.name(), request.kind.name());
     let job = Job {
         client_id: id.clone(),
@@ -53,14 +52,14 @@ pub fn make(root: &Path, config: &Config, request: &JobRequest) -> Result<(Folde
         examples: request.examples,
         seed: request.seed,
         threads: Some(request.threads),
-        submitted_unix_s: now,
+        submitted_unix_s: now_unix_s(),
     };
     folder.set_job(&job)?;
     let mut text = config.text().to_owned();
     for file in config.files() {
         text = bring(root, file, text)?;
     }
-    let scene = root.join("scene.toml");
+    let scene = folder.paths().scene();
     write_atomically(&scene, text.as_bytes()).map_err(|source| FolderError::Io { path: scene, source })?;
     Ok((folder, job))
 }

@@ -92,7 +92,7 @@ fn a_program_that_is_not_there_fails_the_job_and_not_the_daemon() {
 
 #[test]
 fn a_folder_that_cannot_be_written_fails_the_job() {
-    for obstacle in ["state.json.new", "log.txt"] {
+    for obstacle in [".state.json.tmp", "log.txt"] {
         let workplace = Workplace::new("finish");
         workplace.replace_script("while [ ! -e $dir/go ]; do sleep 0.02; done; finish");
         let daemon = workplace.open();

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use plica_training::{Database, JobKind};
+use plica_training::{Database, JobKind, JobPaths};
 
 use crate::commands::train::{OnTerminal, work};
 use crate::config::Config;
@@ -15,7 +15,7 @@ pub(super) fn examples(config: &Config, out: &Path, n: u32) -> anyhow::Result<Tr
     let begin = Instant::now();
     let hash = scene_hash(config)?;
     let root = folder(out, &hash, n);
-    let kept = root.join("database.safetensors");
+    let kept = JobPaths::new(root.clone()).database();
     if let Ok(database) = Database::read(&kept, Some(&hash)) {
         return Ok(Trained { examples: database.examples.len(), seconds: 0.0, database: kept });
     }
@@ -28,7 +28,11 @@ pub(super) fn examples(config: &Config, out: &Path, n: u32) -> anyhow::Result<Tr
     let report = work(config, &job, &folder, n_threads, &watch);
     watch.finish();
     let examples = report?.result.examples;
-    Ok(Trained { examples: examples as usize, seconds: begin.elapsed().as_secs_f64(), database: folder.database() })
+    Ok(Trained {
+        examples: examples as usize,
+        seconds: begin.elapsed().as_secs_f64(),
+        database: folder.paths().database(),
+    })
 }
 
 /// Another scene, or another number, is another folder: nothing in it is ever out of date.

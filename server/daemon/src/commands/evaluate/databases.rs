@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use plica_training::{Database, JobKind, Setup};
+use plica_training::{Database, JobKind, JobPaths, Setup};
 
 use crate::cli::DatabaseArgs;
+use crate::commands::train::default_folder;
 use crate::config::Config;
 
 /// Examples to learn from, and those to judge by.
@@ -39,7 +40,7 @@ pub(in crate::commands) fn read(
 }
 
 fn default_path(config: &Config, kind: JobKind) -> PathBuf {
-    Path::new("out/train").join(format!("{}-{}", config.name(), kind.name())).join("database.safetensors")
+    JobPaths::new(default_folder(config, kind)).database()
 }
 
 /// What makes the file that is missing.

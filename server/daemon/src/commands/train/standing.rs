@@ -1,11 +1,10 @@
 //! `state.json` of a job that is run by hand; of others the daemon writes it.
 
 use std::path::Path;
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
 use plica_protocol::jobs::JobState;
-use plica_training::{Report, TrainingError};
+use plica_training::{Report, TrainingError, now_unix_s};
 
 use crate::jobs::{JobFolder, Standing};
 
@@ -14,7 +13,7 @@ pub(super) fn begin(root: &Path) -> anyhow::Result<Standing> {
     let standing = Standing {
         state: JobState::Running,
         reason: None,
-        started_unix_s: Some(now()),
+        started_unix_s: Some(now_unix_s()),
         finished_unix_s: None,
         pid: Some(std::process::id()),
     };
@@ -31,13 +30,9 @@ pub(super) fn end(root: &Path, begun: Standing, result: &anyhow::Result<Report>)
             _ => (JobState::Failed, Some(format!("{error:#}"))),
         },
     };
-    write(root, &Standing { state, reason, finished_unix_s: Some(now()), pid: None, ..begun })
+    write(root, &Standing { state, reason, finished_unix_s: Some(now_unix_s()), pid: None, ..begun })
 }
 
 fn write(root: &Path, standing: &Standing) -> anyhow::Result<()> {
     JobFolder::new(root.to_owned()).write_standing(standing).with_context(|| root.display().to_string())
-}
-
-fn now() -> u64 {
-    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs())
 }
