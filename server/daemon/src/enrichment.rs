@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use plica_sim::Model;
 use plica_sim::enrichment::{Enricher, EnricherError, EnrichmentOptions, LiveEnrichment};
-use plica_training::{Database, DatabaseError, JobKind};
+use plica_training::{Database, DatabaseError, DatabaseKind};
 
 use crate::config::Config;
 use crate::training::{HashError, scene_hash};
@@ -81,7 +81,7 @@ impl Enrichment {
     pub fn read(&self, path: &Path) -> Result<Ready, EnrichmentError> {
         check_file(path)?;
         let database = Database::read(path, Some(&self.scene_hash))?;
-        if database.about.kind == JobKind::Evaluation {
+        if database.about.kind == DatabaseKind::Evaluation {
             return Err(EnrichmentError::HeldOut { path: path.to_owned() });
         }
         let enricher = Enricher::new(&self.model, &database.leading_examples(usize::MAX), self.options);

@@ -8,7 +8,7 @@ use plica_protocol::skin::{SkinFlags, SkinHeader};
 use plica_protocol::status::{Distribution, ObjectStatus, Realtime, Scheduling, SolverStatus, ToolStatus};
 use plica_protocol::wrench::{Wrench, WrenchFlags};
 use plica_sim::{PoseSample, ToolReading};
-use plica_training::Stage;
+use plica_training::TrainingStage;
 
 use crate::jobs::Standing;
 use crate::realtime::{Frame, Grants, Outcome, Reading, Refusal, Summary, ToolFrame};
@@ -155,21 +155,25 @@ pub fn activate_reply(outcome: &Outcome, n_examples: usize) -> ActivateReply {
 }
 
 /// What a job makes.
-pub fn job_kind(kind: JobKind) -> plica_training::JobKind {
+pub fn job_kind(kind: JobKind) -> plica_training::DatabaseKind {
     match kind {
-        JobKind::Training => plica_training::JobKind::Training,
-        JobKind::Evaluation => plica_training::JobKind::Evaluation,
+        JobKind::Training => plica_training::DatabaseKind::Training,
+        JobKind::Evaluation => plica_training::DatabaseKind::Evaluation,
     }
 }
 
 /// A job: what was asked, where it stands, what its process has said.
-pub fn job(order: &plica_training::Job, standing: &Standing, progress: Option<plica_training::Progress>) -> Job {
+pub fn job(
+    order: &plica_training::TrainingJob,
+    standing: &Standing,
+    progress: Option<plica_training::TrainingProgress>,
+) -> Job {
     Job {
         id: order.id.clone(),
         client_id: order.client_id.clone(),
         kind: match order.kind {
-            plica_training::JobKind::Training => JobKind::Training,
-            plica_training::JobKind::Evaluation => JobKind::Evaluation,
+            plica_training::DatabaseKind::Training => JobKind::Training,
+            plica_training::DatabaseKind::Evaluation => JobKind::Evaluation,
         },
         scene_name: order.scene_name.clone(),
         examples: order.examples,
@@ -184,12 +188,12 @@ pub fn job(order: &plica_training::Job, standing: &Standing, progress: Option<pl
     }
 }
 
-fn job_progress(progress: plica_training::Progress) -> Progress {
-    let plica_training::Progress { stage, done, rejected, total, seconds_left } = progress;
+fn job_progress(progress: plica_training::TrainingProgress) -> Progress {
+    let plica_training::TrainingProgress { stage, done, rejected, total, seconds_left } = progress;
     let stage = match stage {
-        Stage::Interactions => "interactions",
-        Stage::Examples => "examples",
-        Stage::Database => "database",
+        TrainingStage::Interactions => "interactions",
+        TrainingStage::Examples => "examples",
+        TrainingStage::Database => "database",
     };
     Progress { stage: Some(stage.to_owned()), done, rejected, total, seconds_left }
 }

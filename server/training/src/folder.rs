@@ -8,20 +8,20 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::atomic_file::write_json_atomically;
-use crate::database::{About, Database, DatabaseError, JobKind};
+use crate::database::{About, Database, DatabaseError, DatabaseKind};
 use crate::error::TrainingError;
 use crate::example::{Example, Outcome, Rejection};
 use crate::job_folder::{JobPaths, Writer};
 
 /// What a job was asked for, `job.json`. What is left out is the scene's to say.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Job {
+pub struct TrainingJob {
     /// Name of the job.
     pub id: String,
     /// Chosen by the client that submitted it.
     pub client_id: String,
     /// What the examples are for.
-    pub kind: JobKind,
+    pub kind: DatabaseKind,
     /// Name of the scene, for people.
     pub scene_name: String,
     /// How many examples; of an evaluation: in the trained region.
@@ -40,9 +40,9 @@ pub struct Job {
 /// Where a job stands, `progress.json`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Progress {
+pub struct TrainingProgress {
     /// What it is at.
-    pub stage: Stage,
+    pub stage: TrainingStage,
     /// Examples that are on the disk.
     pub done: u32,
     /// Interactions that gave none.
@@ -56,7 +56,7 @@ pub struct Progress {
 /// What a job is at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Stage {
+pub enum TrainingStage {
     /// Draws interactions and builds the models.
     Interactions,
     /// Solves them.
@@ -67,13 +67,13 @@ pub enum Stage {
 
 /// The folder of a job.
 #[derive(Debug)]
-pub struct Folder {
+pub struct TrainingFolder {
     paths: JobPaths,
     /// Held while the folder is open: two processes at one job would do everything twice.
     _lock: File,
 }
 
-impl Folder {
+impl TrainingFolder {
     /// Opens the folder, makes what it lacks, and clears away what a killed process left half written.
     ///
     /// # Errors
@@ -108,7 +108,7 @@ impl Folder {
     ///
     /// # Errors
     /// `job.json` is missing or not what it should be.
-    pub fn job(&self) -> Result<Job, TrainingError> {
+    pub fn job(&self) -> Result<TrainingJob, TrainingError> {
         let path = self.paths.job();
         match read_json(&path)? {
             Some(job) => Ok(job),
@@ -120,10 +120,10 @@ impl Folder {
     ///
     /// # Errors
     /// It cannot be written, or belongs to another job.
-    pub fn set_job(&self, job: &Job) -> Result<(), TrainingError> {
+    pub fn set_job(&self, job: &TrainingJob) -> Result<(), TrainingError> {
         let path = self.paths.job();
-        let asks = |j: &Job| (j.kind, j.examples, j.seed);
-        if let Some(found) = read_json::<Job>(&path)?.filter(|found| asks(found) != asks(job)) {
+        let asks = |j: &TrainingJob| (j.kind, j.examples, j.seed);
+        if let Some(found) = read_json::<TrainingJob>(&path)?.filter(|found| asks(found) != asks(job)) {
             let problem = format!(
                 "the folder holds another job ({} {:?} with seed {:?}); choose another folder, or remove this one",
                 found.kind.name(),
@@ -139,7 +139,7 @@ impl Folder {
     ///
     /// # Errors
     /// It cannot be written.
-    pub fn set_progress(&self, progress: &Progress) -> Result<(), TrainingError> {
+    pub fn set_progress(&self, progress: &TrainingProgress) -> Result<(), TrainingError> {
         write_json(&self.paths.progress(), progress)
     }
 

@@ -4,20 +4,20 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::Instant;
 
-use crate::database::{About, Database, JobKind};
+use crate::database::{About, Database, DatabaseKind};
 use crate::error::{PlanError, TrainingError};
 use crate::example::Outcome;
-use crate::folder::{Folder, Job, Progress, Stage, from_database};
+use crate::folder::{TrainingFolder, TrainingJob, TrainingProgress, TrainingStage, from_database};
 use crate::interaction::Interaction;
 use crate::plan::plan;
-use crate::report::{Report, Run};
+use crate::report::{Run, TrainingReport};
 use crate::setup::{InteractionSet, Setup};
 use crate::tandem::Tandem;
 
 /// Who watches a job.
 pub trait Watch: Sync {
     /// After every interaction, and when the stage changes.
-    fn progress(&self, progress: &Progress);
+    fn progress(&self, progress: &TrainingProgress);
     /// Asked before every Newton step and every few ticks; true ends the job.
     fn cancelled(&self) -> bool;
 }
@@ -29,16 +29,17 @@ pub trait Watch: Sync {
 /// See [`TrainingError`]. Finished examples are kept in any case.
 pub fn run(
     setup: &Setup,
-    job: &Job,
+    job: &TrainingJob,
     n_threads: usize,
-    folder: &Folder,
+    folder: &TrainingFolder,
     watch: &dyn Watch,
-) -> Result<Report, TrainingError> {
+) -> Result<TrainingReport, TrainingError> {
     let begin = Instant::now();
     let (sets, seed) = ask(setup, job);
     let about = About::new(&setup.scene_hash, job.kind, seed);
     let total = sets.iter().map(|set| set.count as u32).sum();
-    let start = Progress { stage: Stage::Interactions, done: 0, rejected: 0, total, seconds_left: None };
+    let start =
+        TrainingProgress { stage: TrainingStage::Interactions, done: 0, rejected: 0, total, seconds_left: None };
     tell(folder, watch, &start)?;
     let interactions = plan(setup, &sets, seed)?;
     let tally = Tally::new(folder, watch, interactions.len() as u32, n_threads);
@@ -55,7 +56,7 @@ pub fn run(
     let n_threads = n_threads.clamp(1, open.len().max(1));
     let work = Work { setup, interactions: &interactions, open: &open, about: &about, kind: job.kind };
     let sizes = work.run(n_threads, folder, watch, &tally)?;
-    tell(folder, watch, &Progress { stage: Stage::Database, seconds_left: Some(0.0), ..tally.now() })?;
+    tell(folder, watch, &TrainingProgress { stage: TrainingStage::Database, seconds_left: Some(0.0), ..tally.now() })?;
     let database = assemble(folder, &about, &fingerprints)?;
     let path = folder.paths().database();
     let nothing = || PlanError::AllRejected { n: database.rejected.len(), first: first_message(&database) };
@@ -70,16 +71,16 @@ pub fn run(
         resumed: n_resumed,
         ..tally.times()
     };
-    let report = Report::new(setup, &database, interactions.len(), sizes, run);
+    let report = TrainingReport::new(setup, &database, interactions.len(), sizes, run);
     folder.set_report(&report)?;
     Ok(report)
 }
 
 /// Sets and seed: the scene's, unless the job says otherwise.
-fn ask(setup: &Setup, job: &Job) -> (Vec<InteractionSet>, u64) {
+fn ask(setup: &Setup, job: &TrainingJob) -> (Vec<InteractionSet>, u64) {
     let (mut sets, seed) = match job.kind {
-        JobKind::Training => (vec![setup.training.clone()], setup.training_seed),
-        JobKind::Evaluation => (setup.evaluation.clone(), setup.evaluation_seed),
+        DatabaseKind::Training => (vec![setup.training.clone()], setup.training_seed),
+        DatabaseKind::Evaluation => (setup.evaluation.clone(), setup.evaluation_seed),
     };
     if let (Some(examples), Some(first)) = (job.examples, sets.first_mut()) {
         first.count = examples as usize;
@@ -93,7 +94,7 @@ struct Work<'a> {
     interactions: &'a [Interaction],
     open: &'a [usize],
     about: &'a About,
-    kind: JobKind,
+    kind: DatabaseKind,
 }
 
 impl Work<'_> {
@@ -101,7 +102,7 @@ impl Work<'_> {
     fn run(
         &self,
         n_threads: usize,
-        folder: &Folder,
+        folder: &TrainingFolder,
         watch: &dyn Watch,
         tally: &Tally<'_>,
     ) -> Result<(usize, usize), TrainingError> {
@@ -113,7 +114,7 @@ impl Work<'_> {
             let mut tandem = Tandem::new(self.setup)?;
             while let Some(&index) = self.open.get(next.fetch_add(1, Relaxed)) {
                 let begin = Instant::now();
-                let two = self.kind == JobKind::Evaluation;
+                let two = self.kind == DatabaseKind::Evaluation;
                 let outcome = tandem.solve(index as u32, &self.interactions[index], two, &cancelled);
                 let outcome = outcome.map_err(|_| TrainingError::Interrupted)?;
                 folder.store(self.about, &outcome)?;
@@ -136,7 +137,7 @@ impl Work<'_> {
 }
 
 /// Examples in the order of the plan, from the disk: those of earlier runs and of this one alike.
-fn assemble(folder: &Folder, about: &About, fingerprints: &[String]) -> Result<Database, TrainingError> {
+fn assemble(folder: &TrainingFolder, about: &About, fingerprints: &[String]) -> Result<Database, TrainingError> {
     let mut database = Database { about: about.clone(), examples: Vec::new(), rejected: Vec::new() };
     for (index, expected) in fingerprints.iter().enumerate() {
         match folder.finished(about, index as u32, expected)? {
@@ -155,7 +156,7 @@ fn first_message(database: &Database) -> String {
     database.rejected.first().map_or_else(String::new, |r| r.message.clone())
 }
 
-fn tell(folder: &Folder, watch: &dyn Watch, progress: &Progress) -> Result<(), TrainingError> {
+fn tell(folder: &TrainingFolder, watch: &dyn Watch, progress: &TrainingProgress) -> Result<(), TrainingError> {
     folder.set_progress(progress)?;
     watch.progress(progress);
     Ok(())
@@ -163,7 +164,7 @@ fn tell(folder: &Folder, watch: &dyn Watch, progress: &Progress) -> Result<(), T
 
 /// Counts what is finished, and how long it took.
 struct Tally<'a> {
-    folder: &'a Folder,
+    folder: &'a TrainingFolder,
     watch: &'a dyn Watch,
     total: u32,
     n_threads: usize,
@@ -178,7 +179,7 @@ struct Counts {
 }
 
 impl<'a> Tally<'a> {
-    fn new(folder: &'a Folder, watch: &'a dyn Watch, total: u32, n_threads: usize) -> Self {
+    fn new(folder: &'a TrainingFolder, watch: &'a dyn Watch, total: u32, n_threads: usize) -> Self {
         Self { folder, watch, total, n_threads, counts: Mutex::new(Counts::default()) }
     }
 
@@ -202,17 +203,17 @@ impl<'a> Tally<'a> {
         tell(self.folder, self.watch, &self.now())
     }
 
-    fn now(&self) -> Progress {
+    fn now(&self) -> TrainingProgress {
         self.progress(&self.counts())
     }
 
-    fn progress(&self, counts: &Counts) -> Progress {
+    fn progress(&self, counts: &Counts) -> TrainingProgress {
         let left = self.total.saturating_sub(counts.done + counts.rejected);
         let mean = |seconds: &[f64]| seconds.iter().sum::<f64>() / seconds.len() as f64;
         let seconds_left = (!counts.seconds.is_empty())
             .then(|| mean(&counts.seconds) * f64::from(left) / self.n_threads.max(1) as f64);
         let (done, rejected, total) = (counts.done, counts.rejected, self.total);
-        Progress { stage: Stage::Examples, done, rejected, total, seconds_left }
+        TrainingProgress { stage: TrainingStage::Examples, done, rejected, total, seconds_left }
     }
 
     fn times(&self) -> Run {

@@ -71,7 +71,7 @@ impl JobPaths {
         self.0.join(STATE)
     }
 
-    /// Progress of the process.
+    /// TrainingProgress of the process.
     pub fn progress(&self) -> PathBuf {
         self.0.join(PROGRESS)
     }
@@ -81,7 +81,7 @@ impl JobPaths {
         self.0.join(LOG)
     }
 
-    /// Folder of finished interactions.
+    /// TrainingFolder of finished interactions.
     pub fn examples(&self) -> PathBuf {
         self.0.join(EXAMPLES)
     }

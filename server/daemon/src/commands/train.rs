@@ -8,7 +8,7 @@ mod watch;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use plica_training::{Folder, Job, JobKind, Report, default_threads, write_atomically};
+use plica_training::{DatabaseKind, TrainingFolder, TrainingJob, TrainingReport, default_threads, write_atomically};
 
 use crate::cli::{TrainArgs, TrainKind};
 use crate::config::Config;
@@ -37,8 +37,8 @@ pub fn run(args: &TrainArgs, json: bool) -> anyhow::Result<()> {
 fn run_scene(config: &Config, args: &TrainArgs, n_threads: u32, json: bool) -> anyhow::Result<()> {
     let ending = Ending::listen()?;
     let kind = match args.kind {
-        TrainKind::Training => JobKind::Training,
-        TrainKind::Evaluation => JobKind::Evaluation,
+        TrainKind::Training => DatabaseKind::Training,
+        TrainKind::Evaluation => DatabaseKind::Evaluation,
     };
     let root = args.folder.clone().unwrap_or_else(|| default_folder(config, kind));
     let request = JobRequest { kind, examples: args.examples, seed: args.seed, threads: n_threads };
@@ -67,7 +67,7 @@ fn run_scene(config: &Config, args: &TrainArgs, n_threads: u32, json: bool) -> a
 fn run_job(root: &Path, threads: Option<u32>, json: bool) -> anyhow::Result<()> {
     let ending = Ending::listen()?;
     anyhow::ensure!(root.is_dir(), "{}: is no job folder: there is no such folder", root.display());
-    let folder = Folder::open(root)?;
+    let folder = TrainingFolder::open(root)?;
     let job = folder.job()?;
     let config = Config::from_file(&folder.paths().scene())?;
     let n_threads = threads.or(job.threads).unwrap_or_else(default_threads);
@@ -83,17 +83,17 @@ fn run_job(root: &Path, threads: Option<u32>, json: bool) -> anyhow::Result<()> 
 /// The one code path of all.
 pub(super) fn work(
     config: &Config,
-    job: &Job,
-    folder: &Folder,
+    job: &TrainingJob,
+    folder: &TrainingFolder,
     n_threads: usize,
     watch: &dyn plica_training::Watch,
-) -> anyhow::Result<Report> {
+) -> anyhow::Result<TrainingReport> {
     let setup = setup(config)?;
     Ok(plica_training::run(&setup, job, n_threads, folder, watch)?)
 }
 
-/// Folder of a job by hand, unless another one is named.
-pub(super) fn default_folder(config: &Config, kind: JobKind) -> PathBuf {
+/// TrainingFolder of a job by hand, unless another one is named.
+pub(super) fn default_folder(config: &Config, kind: DatabaseKind) -> PathBuf {
     Path::new("out/train").join(format!("{}-{}", config.name(), kind.name()))
 }
 
@@ -106,7 +106,7 @@ fn copy(database: &Path, out: &Path) -> anyhow::Result<()> {
     write_atomically(out, &bytes).with_context(|| name(out))
 }
 
-fn summary(report: &Report, database: &Path, folder: &Path) -> Result<String, serde_json::Error> {
+fn summary(report: &TrainingReport, database: &Path, folder: &Path) -> Result<String, serde_json::Error> {
     let mut value = serde_json::to_value(report)?;
     value["database"] = database.display().to_string().into();
     value["folder"] = folder.display().to_string().into();

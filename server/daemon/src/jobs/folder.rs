@@ -7,7 +7,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use plica_protocol::jobs::{JobFile, JobState};
-use plica_training::{Job, JobPaths, Progress, Stage, write_json_atomically};
+use plica_training::{JobPaths, TrainingJob, TrainingProgress, TrainingStage, write_json_atomically};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -77,12 +77,12 @@ impl JobFolder {
     }
 
     /// Reads `job.json`; the error is a sentence.
-    pub fn job(&self) -> Result<Job, String> {
+    pub fn job(&self) -> Result<TrainingJob, String> {
         read_json(&self.0.job())
     }
 
     /// Writes `job.json`.
-    pub fn write_job(&self, job: &Job) -> io::Result<()> {
+    pub fn write_job(&self, job: &TrainingJob) -> io::Result<()> {
         write_json_atomically(&self.0.job(), job)
     }
 
@@ -98,13 +98,13 @@ impl JobFolder {
 
     /// What `progress.json` says; `None` before there is one. A process that begins anew says that nothing is finished
     /// until it has read what is there: then the examples on disk are counted.
-    pub fn progress(&self) -> Option<Progress> {
-        let progress: Progress = read_json(&self.0.progress()).ok()?;
-        if progress.stage != Stage::Interactions {
+    pub fn progress(&self) -> Option<TrainingProgress> {
+        let progress: TrainingProgress = read_json(&self.0.progress()).ok()?;
+        if progress.stage != TrainingStage::Interactions {
             return Some(progress);
         }
         let (done, rejected) = self.0.count_finished();
-        Some(Progress { done, rejected, ..progress })
+        Some(TrainingProgress { done, rejected, ..progress })
     }
 
     /// Whether a process works in it, one started by hand or one that is still ending: it holds a lock.
@@ -181,7 +181,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let job = JobFolder::new(folder.path().to_owned());
         assert!(!job.is_busy());
-        let held = plica_training::Folder::open(folder.path()).unwrap();
+        let held = plica_training::TrainingFolder::open(folder.path()).unwrap();
         assert!(job.is_busy());
         drop(held);
         assert!(!job.is_busy());

@@ -5,7 +5,7 @@ use std::io;
 use std::path::Path;
 
 use plica_protocol::jobs::{JobSubmitReply, JobSubmitRequest};
-use plica_training::{Job as Order, default_threads, now_unix_s, sync_folder};
+use plica_training::{TrainingJob, default_threads, now_unix_s, sync_folder};
 
 use super::JobError;
 use super::folder::{JobFolder, Standing};
@@ -58,8 +58,8 @@ fn same(entry: &Entry, request: &JobSubmitRequest) -> Result<(), JobError> {
     }
 }
 
-fn order(request: &JobSubmitRequest, scene: &JobScene, id: String) -> Order {
-    Order {
+fn order(request: &JobSubmitRequest, scene: &JobScene, id: String) -> TrainingJob {
+    TrainingJob {
         id,
         client_id: request.client_id.clone(),
         kind: wire::job_kind(request.kind),
@@ -72,7 +72,7 @@ fn order(request: &JobSubmitRequest, scene: &JobScene, id: String) -> Order {
 }
 
 /// Makes the folder beside its place and moves it there: it is complete, or not there.
-fn make(jobs: &Path, folder: &JobFolder, scene: &JobScene, order: &Order, standing: &Standing) -> io::Result<()> {
+fn make(jobs: &Path, folder: &JobFolder, scene: &JobScene, order: &TrainingJob, standing: &Standing) -> io::Result<()> {
     let path = jobs.join(SUBMITTING);
     let made = fill(&JobFolder::new(path.clone()), scene, order, standing);
     let made = made.and_then(|()| fs::rename(&path, folder.path())).and_then(|()| sync_folder(jobs));
@@ -82,7 +82,7 @@ fn make(jobs: &Path, folder: &JobFolder, scene: &JobScene, order: &Order, standi
     made
 }
 
-fn fill(folder: &JobFolder, scene: &JobScene, order: &Order, standing: &Standing) -> io::Result<()> {
+fn fill(folder: &JobFolder, scene: &JobScene, order: &TrainingJob, standing: &Standing) -> io::Result<()> {
     if folder.path().exists() {
         fs::remove_dir_all(folder.path())?;
     }

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
-use plica_training::{Folder, Job, JobKind, TrainingError, Writer, now_unix_s, write_atomically};
+use plica_training::{DatabaseKind, TrainingError, TrainingFolder, TrainingJob, Writer, now_unix_s, write_atomically};
 
 use crate::config::{Config, SceneFile};
 
@@ -11,7 +11,7 @@ use crate::config::{Config, SceneFile};
 #[derive(Debug, Clone, Copy)]
 pub struct JobRequest {
     /// What the examples are for.
-    pub kind: JobKind,
+    pub kind: DatabaseKind,
     /// How many, if not what the scene says.
     pub examples: Option<u32>,
     /// Seed, if not what the scene says.
@@ -40,11 +40,11 @@ pub enum FolderError {
 ///
 /// # Errors
 /// See [`FolderError`].
-pub fn make(root: &Path, config: &Config, request: &JobRequest) -> Result<(Folder, Job), FolderError> {
-    let folder = Folder::open(root)?;
+pub fn make(root: &Path, config: &Config, request: &JobRequest) -> Result<(TrainingFolder, TrainingJob), FolderError> {
+    let folder = TrainingFolder::open(root)?;
     folder.paths().sweep(Writer::Submitter).map_err(|source| FolderError::Io { path: root.to_owned(), source })?;
     let id = format!("{}-{}", config.name(), request.kind.name());
-    let job = Job {
+    let job = TrainingJob {
         client_id: id.clone(),
         id,
         kind: request.kind,

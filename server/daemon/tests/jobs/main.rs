@@ -189,7 +189,7 @@ fn a_folder_in_which_somebody_works_has_to_wait() {
     let workplace = Workplace::new("while [ ! -e $dir/go ]; do sleep 0.02; done; finish");
     let daemon = workplace.open();
     let [first, busy, last] = ["a", "b", "c"].map(|client_id| daemon.submit(client_id).id);
-    let held = plica_training::Folder::open(&workplace.path("jobs").join(&busy)).unwrap();
+    let held = plica_training::TrainingFolder::open(&workplace.path("jobs").join(&busy)).unwrap();
     for id in [&first, &busy, &last] {
         fs::write(workplace.in_job(id, "go"), "").unwrap();
     }

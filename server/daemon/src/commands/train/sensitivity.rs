@@ -1,6 +1,6 @@
 //! `plicad train --sensitivity`: how firm the accurate skin is.
 
-use plica_training::{Difference, Progress, Sensitivity, Variations, Watch, sensitivity};
+use plica_training::{Difference, Sensitivity, TrainingProgress, Variations, Watch, sensitivity};
 
 use super::watch::Ending;
 use crate::config::Config;
@@ -15,7 +15,7 @@ const TIE_FACTORS: [f64; 4] = [0.1, 1.0, 10.0, 100.0];
 struct Quiet(Ending);
 
 impl Watch for Quiet {
-    fn progress(&self, _: &Progress) {}
+    fn progress(&self, _: &TrainingProgress) {}
     fn cancelled(&self) -> bool {
         self.0.is_asked()
     }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::Context;
 use plica_protocol::jobs::JobState;
-use plica_training::{Report, TrainingError, now_unix_s};
+use plica_training::{TrainingError, TrainingReport, now_unix_s};
 
 use crate::jobs::{JobFolder, Standing};
 
@@ -22,7 +22,7 @@ pub(super) fn begin(root: &Path) -> anyhow::Result<Standing> {
 }
 
 /// Notes how it ended, and why.
-pub(super) fn end(root: &Path, begun: Standing, result: &anyhow::Result<Report>) -> anyhow::Result<()> {
+pub(super) fn end(root: &Path, begun: Standing, result: &anyhow::Result<TrainingReport>) -> anyhow::Result<()> {
     let (state, reason) = match result {
         Ok(_) => (JobState::Done, None),
         Err(error) => match error.downcast_ref() {

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
-use plica_training::{Progress, Report, Stage, Watch};
+use plica_training::{TrainingProgress, TrainingReport, TrainingStage, Watch};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 /// At least this long between two lines of a log.
@@ -52,7 +52,7 @@ impl OnTerminal {
 }
 
 impl Watch for OnTerminal {
-    fn progress(&self, p: &Progress) {
+    fn progress(&self, p: &TrainingProgress) {
         self.bar.set_length(p.total.into());
         self.bar.set_position((p.done + p.rejected).into());
         self.bar.set_message(line(p));
@@ -68,7 +68,7 @@ impl Watch for OnTerminal {
 pub(super) struct ToLog {
     ending: Ending,
     kind: &'static str,
-    last: Mutex<Option<(Instant, Stage, u32)>>,
+    last: Mutex<Option<(Instant, TrainingStage, u32)>>,
 }
 
 impl ToLog {
@@ -76,14 +76,14 @@ impl ToLog {
         Self { ending, kind, last: Mutex::new(None) }
     }
 
-    pub(super) fn done(&self, report: &Report) {
+    pub(super) fn done(&self, report: &TrainingReport) {
         let (examples, rejected) = (report.result.examples, report.result.rejected.len());
         eprintln!("{}: {examples} examples, {rejected} rejected, in {:.0} s", self.kind, report.run.wall_s);
     }
 }
 
 impl Watch for ToLog {
-    fn progress(&self, p: &Progress) {
+    fn progress(&self, p: &TrainingProgress) {
         let mut last = self.last.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let is_news = last.is_none_or(|(at, stage, rejected)| {
             at.elapsed() >= LOG_INTERVAL || stage != p.stage || rejected != p.rejected
@@ -99,12 +99,12 @@ impl Watch for ToLog {
     }
 }
 
-fn line(p: &Progress) -> String {
+fn line(p: &TrainingProgress) -> String {
     match (p.stage, p.seconds_left) {
-        (Stage::Interactions, _) => "draws interactions".to_owned(),
-        (Stage::Database, _) => "writes the database".to_owned(),
-        (Stage::Examples, None) => format!("{} rejected", p.rejected),
-        (Stage::Examples, Some(seconds)) => {
+        (TrainingStage::Interactions, _) => "draws interactions".to_owned(),
+        (TrainingStage::Database, _) => "writes the database".to_owned(),
+        (TrainingStage::Examples, None) => format!("{} rejected", p.rejected),
+        (TrainingStage::Examples, Some(seconds)) => {
             let left = HumanDuration(Duration::from_secs_f64(seconds.clamp(0.0, 1e9)));
             format!("{} rejected, {left} left", p.rejected)
         }
