@@ -1,5 +1,6 @@
 //! The job itself: plan, solve in parallel, assemble.
 
+use std::ops::ControlFlow;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::Instant;
@@ -14,13 +15,9 @@ use crate::report::{Run, TrainingReport};
 use crate::setup::{InteractionSet, Setup};
 use crate::tandem::Tandem;
 
-/// Who watches a job.
-pub trait Watch: Sync {
-    /// After every interaction, and when the stage changes.
-    fn progress(&self, progress: &TrainingProgress);
-    /// Asked before every Newton step and every few ticks; true ends the job.
-    fn cancelled(&self) -> bool;
-}
+/// Observer of a job: called when the stage changes, after every interaction, before every Newton step and every few ticks.
+/// `Break` ends the job at its next Newton step or tick; if none is left to solve, the job is finished all the same.
+pub type Observer<'a> = &'a mut (dyn FnMut(TrainingProgress) -> ControlFlow<()> + Send);
 
 /// Runs the job of `folder` on `n_threads` threads, or goes on with it. The database does not depend on their number, nor on
 /// how often the job was ended and begun again.
@@ -32,17 +29,16 @@ pub fn run(
     job: &TrainingJob,
     n_threads: usize,
     folder: &TrainingFolder,
-    watch: &dyn Watch,
+    observer: Observer<'_>,
 ) -> Result<TrainingReport, TrainingError> {
     let begin = Instant::now();
     let (sets, seed) = ask(setup, job);
     let about = About::new(&setup.scene_hash, job.kind, seed);
     let total = sets.iter().map(|set| set.count as u32).sum();
-    let start =
-        TrainingProgress { stage: TrainingStage::Interactions, done: 0, rejected: 0, total, seconds_left: None };
-    tell(folder, watch, &start)?;
+    let mut tally = Tally::new(folder, observer, total, n_threads);
+    tally.announce(TrainingStage::Interactions)?;
     let interactions = plan(setup, &sets, seed)?;
-    let tally = Tally::new(folder, watch, interactions.len() as u32, n_threads);
+    tally.total = interactions.len() as u32;
     let fingerprints: Vec<String> = interactions.iter().map(|i| setup.fingerprint(i)).collect();
     let mut open = Vec::new();
     for (index, expected) in fingerprints.iter().enumerate() {
@@ -51,12 +47,12 @@ pub fn run(
             None => open.push(index),
         }
     }
-    tally.report()?;
+    tally.announce(TrainingStage::Examples)?;
     let n_resumed = interactions.len() - open.len();
     let n_threads = n_threads.clamp(1, open.len().max(1));
     let work = Work { setup, interactions: &interactions, open: &open, about: &about, kind: job.kind };
-    let sizes = work.run(n_threads, folder, watch, &tally)?;
-    tell(folder, watch, &TrainingProgress { stage: TrainingStage::Database, seconds_left: Some(0.0), ..tally.now() })?;
+    let sizes = work.run(n_threads, folder, &tally)?;
+    tally.announce(TrainingStage::Database)?;
     let database = assemble(folder, &about, &fingerprints)?;
     let path = folder.paths().database();
     let nothing = || PlanError::AllRejected { n: database.rejected.len(), first: first_message(&database) };
@@ -103,13 +99,12 @@ impl Work<'_> {
         &self,
         n_threads: usize,
         folder: &TrainingFolder,
-        watch: &dyn Watch,
         tally: &Tally<'_>,
     ) -> Result<(usize, usize), TrainingError> {
         let threads = |e: rayon::ThreadPoolBuildError| TrainingError::Threads { n_threads, reason: e.to_string() };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().map_err(threads)?;
         let (next, failed) = (AtomicUsize::new(0), AtomicUsize::new(0));
-        let cancelled = || watch.cancelled() || failed.load(Relaxed) > 0;
+        let cancelled = || tally.is_cancelled() || failed.load(Relaxed) > 0;
         let worker = |_: rayon::BroadcastContext<'_>| {
             let mut tandem = Tandem::new(self.setup)?;
             while let Some(&index) = self.open.get(next.fetch_add(1, Relaxed)) {
@@ -156,19 +151,19 @@ fn first_message(database: &Database) -> String {
     database.rejected.first().map_or_else(String::new, |r| r.message.clone())
 }
 
-fn tell(folder: &TrainingFolder, watch: &dyn Watch, progress: &TrainingProgress) -> Result<(), TrainingError> {
-    folder.set_progress(progress)?;
-    watch.progress(progress);
-    Ok(())
-}
-
-/// Counts what is finished, and how long it took.
+/// Counts what is finished, times it, and reports it to the folder and the observer.
 struct Tally<'a> {
     folder: &'a TrainingFolder,
-    watch: &'a dyn Watch,
     total: u32,
     n_threads: usize,
-    counts: Mutex<Counts>,
+    shared: Mutex<Shared<'a>>,
+}
+
+/// State that threads change in turn, so that progress never runs backwards.
+struct Shared<'a> {
+    counts: Counts,
+    observer: Observer<'a>,
+    is_cancelled: bool,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -179,50 +174,69 @@ struct Counts {
 }
 
 impl<'a> Tally<'a> {
-    fn new(folder: &'a TrainingFolder, watch: &'a dyn Watch, total: u32, n_threads: usize) -> Self {
-        Self { folder, watch, total, n_threads, counts: Mutex::new(Counts::default()) }
+    fn new(folder: &'a TrainingFolder, observer: Observer<'a>, total: u32, n_threads: usize) -> Self {
+        let shared = Shared { counts: Counts::default(), observer, is_cancelled: false };
+        Self { folder, total, n_threads, shared: Mutex::new(shared) }
     }
 
-    fn counts(&self) -> std::sync::MutexGuard<'_, Counts> {
-        self.counts.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    fn shared(&self) -> std::sync::MutexGuard<'_, Shared<'a>> {
+        self.shared.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
 
     fn found(&self, outcome: &Outcome) {
-        self.counts().count(outcome);
+        self.shared().counts.count(outcome);
     }
 
     fn solved(&self, outcome: &Outcome, seconds: f64) -> Result<(), TrainingError> {
-        let mut counts = self.counts();
-        counts.count(outcome);
-        counts.seconds.push(seconds);
-        // Told under the lock, so that progress never runs backwards.
-        tell(self.folder, self.watch, &self.progress(&counts))
+        let mut shared = self.shared();
+        shared.counts.count(outcome);
+        shared.counts.seconds.push(seconds);
+        self.report(&mut shared, TrainingStage::Examples)
     }
 
-    fn report(&self) -> Result<(), TrainingError> {
-        tell(self.folder, self.watch, &self.now())
+    fn announce(&self, stage: TrainingStage) -> Result<(), TrainingError> {
+        self.report(&mut self.shared(), stage)
     }
 
-    fn now(&self) -> TrainingProgress {
-        self.progress(&self.counts())
+    fn report(&self, shared: &mut Shared<'_>, stage: TrainingStage) -> Result<(), TrainingError> {
+        let progress = self.progress(&shared.counts, stage);
+        self.folder.set_progress(&progress)?;
+        shared.observe(progress);
+        Ok(())
     }
 
-    fn progress(&self, counts: &Counts) -> TrainingProgress {
+    fn is_cancelled(&self) -> bool {
+        let mut shared = self.shared();
+        let progress = self.progress(&shared.counts, TrainingStage::Examples);
+        shared.observe(progress);
+        shared.is_cancelled
+    }
+
+    fn progress(&self, counts: &Counts, stage: TrainingStage) -> TrainingProgress {
         let left = self.total.saturating_sub(counts.done + counts.rejected);
         let mean = |seconds: &[f64]| seconds.iter().sum::<f64>() / seconds.len() as f64;
-        let seconds_left = (!counts.seconds.is_empty())
-            .then(|| mean(&counts.seconds) * f64::from(left) / self.n_threads.max(1) as f64);
+        let seconds_left = match stage {
+            TrainingStage::Database => Some(0.0),
+            _ => (!counts.seconds.is_empty())
+                .then(|| mean(&counts.seconds) * f64::from(left) / self.n_threads.max(1) as f64),
+        };
         let (done, rejected, total) = (counts.done, counts.rejected, self.total);
-        TrainingProgress { stage: TrainingStage::Examples, done, rejected, total, seconds_left }
+        TrainingProgress { stage, done, rejected, total, seconds_left }
     }
 
     fn times(&self) -> Run {
-        let seconds = &self.counts().seconds;
+        let seconds = &self.shared().counts.seconds;
         Run {
             mean_s: (!seconds.is_empty()).then(|| seconds.iter().sum::<f64>() / seconds.len() as f64),
             max_s: seconds.iter().copied().reduce(f64::max),
             ..Run::default()
         }
+    }
+}
+
+impl Shared<'_> {
+    fn observe(&mut self, progress: TrainingProgress) {
+        self.is_cancelled |= (self.observer)(progress).is_break();
     }
 }
 

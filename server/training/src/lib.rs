@@ -42,7 +42,7 @@ pub use database::{
 pub use error::{BuildError, INTERRUPTED, PlanError, TrainingError};
 pub use example::{Example, Outcome, Reason, Record, Rejection, SettlingRecord};
 pub use folder::{TrainingFolder, TrainingJob, TrainingProgress, TrainingStage};
-pub use generate::{Watch, run};
+pub use generate::{Observer, run};
 pub use host::{default_threads, now_unix_s};
 pub use interaction::{Action, Interaction};
 pub use job_folder::{JobPaths, Writer};

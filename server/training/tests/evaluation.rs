@@ -4,20 +4,12 @@
 mod common;
 
 use std::cell::RefCell;
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use plica_training::evaluation::*;
 use plica_training::*;
 use tempfile::TempDir;
-
-struct Patient;
-
-impl Watch for Patient {
-    fn progress(&self, _: &TrainingProgress) {}
-    fn cancelled(&self) -> bool {
-        false
-    }
-}
 
 fn train(setup: &Setup, kind: DatabaseKind) -> Database {
     let folder = TempDir::new().unwrap();
@@ -31,7 +23,7 @@ fn train(setup: &Setup, kind: DatabaseKind) -> Database {
         threads: None,
         submitted_unix_s: 0,
     };
-    run(setup, &job, 2, &TrainingFolder::open(folder.path()).unwrap(), &Patient).unwrap();
+    run(setup, &job, 2, &TrainingFolder::open(folder.path()).unwrap(), &mut |_| ControlFlow::Continue(())).unwrap();
     Database::read(&folder.path().join("database.safetensors"), Some(&setup.scene_hash)).unwrap()
 }
 

@@ -45,7 +45,7 @@ fn run_scene(config: &Config, args: &TrainArgs, n_threads: u32, json: bool) -> a
     let (folder, job) = make(&root, config, &request)?;
     let begun = standing::begin(&root)?;
     let watch = OnTerminal::new(Some(ending));
-    let result = work(config, &job, &folder, n_threads as usize, &watch);
+    let result = work(config, &job, &folder, n_threads as usize, &mut |p| watch.observe(&p));
     watch.finish();
     // The result counts, even if the note about it cannot be written.
     if let Err(error) = standing::end(&root, begun, &result) {
@@ -71,8 +71,8 @@ fn run_job(root: &Path, threads: Option<u32>, json: bool) -> anyhow::Result<()> 
     let job = folder.job()?;
     let config = Config::from_file(&folder.paths().scene())?;
     let n_threads = threads.or(job.threads).unwrap_or_else(default_threads);
-    let watch = ToLog::new(ending, job.kind.name());
-    let report = work(&config, &job, &folder, n_threads as usize, &watch)?;
+    let mut watch = ToLog::new(ending, job.kind.name());
+    let report = work(&config, &job, &folder, n_threads as usize, &mut |p| watch.observe(&p))?;
     watch.done(&report);
     if json {
         println!("{}", summary(&report, &folder.paths().database(), root)?);
@@ -86,10 +86,10 @@ pub(super) fn work(
     job: &TrainingJob,
     folder: &TrainingFolder,
     n_threads: usize,
-    watch: &dyn plica_training::Watch,
+    observer: plica_training::Observer<'_>,
 ) -> anyhow::Result<TrainingReport> {
     let setup = setup(config)?;
-    Ok(plica_training::run(&setup, job, n_threads, folder, watch)?)
+    Ok(plica_training::run(&setup, job, n_threads, folder, observer)?)
 }
 
 /// TrainingFolder of a job by hand, unless another one is named.

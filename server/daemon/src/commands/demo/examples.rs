@@ -25,7 +25,7 @@ pub(super) fn examples(config: &Config, out: &Path, n: u32) -> anyhow::Result<Tr
     let (folder, job) = make(&root, config, &request)?;
     eprintln!("trains {n} examples in {}, once", root.display());
     let watch = OnTerminal::new(None);
-    let report = work(config, &job, &folder, n_threads, &watch);
+    let report = work(config, &job, &folder, n_threads, &mut |p| watch.observe(&p));
     watch.finish();
     let examples = report?.result.examples;
     Ok(Trained {
