@@ -8,7 +8,7 @@ use plica_scene::Config;
 use plica_scene::hash::{HashError, scene_hash};
 use plica_sim::Model;
 use plica_sim::enrichment::{Enricher, EnricherError, EnrichmentOptions, LiveEnrichment};
-use plica_training::{Database, DatabaseError, JobKind};
+use plica_training::{Database, DatabaseError, DatabaseKind};
 
 /// A larger file is no database that a simulation can be enriched with.
 const MAX_BYTES: u64 = 4 << 30;
@@ -80,7 +80,7 @@ impl Enrichment {
     pub fn read(&self, path: &Path) -> Result<Ready, EnrichmentError> {
         check_file(path)?;
         let database = Database::read(path, Some(&self.scene_hash))?;
-        if database.about.kind == JobKind::Evaluation {
+        if database.about.kind == DatabaseKind::Evaluation {
             return Err(EnrichmentError::HeldOut { path: path.to_owned() });
         }
         let enricher = Enricher::new(&self.model, &database.leading_examples(usize::MAX), self.options);

@@ -6,16 +6,17 @@ use std::path::{Component, Path, PathBuf};
 use plica_protocol::jobs::JobState;
 use plica_scene::Config;
 use plica_scene::scene::SceneFile;
-use plica_training::{Folder, Job, JobKind, Report, TrainingError, write_atomically};
+use plica_training::{
+    DatabaseKind, TrainingError, TrainingFolder, TrainingJob, TrainingReport, Writer, now_unix_s, write_atomically,
+};
 
-use crate::clock::now_unix_s;
 use crate::folder::{JobFolder, Standing};
 
 /// What is asked on the command line.
 #[derive(Debug, Clone, Copy)]
 pub struct JobRequest {
     /// What the examples are for.
-    pub kind: JobKind,
+    pub kind: DatabaseKind,
     /// How many, if not what the scene says.
     pub examples: Option<u32>,
     /// Seed, if not what the scene says.
@@ -44,11 +45,11 @@ pub enum FolderError {
 ///
 /// # Errors
 /// See [`FolderError`].
-pub fn make(root: &Path, config: &Config, request: &JobRequest) -> Result<(Folder, Job), FolderError> {
-    let folder = Folder::open(root)?;
-    let now = now_unix_s();
+pub fn make(root: &Path, config: &Config, request: &JobRequest) -> Result<(TrainingFolder, TrainingJob), FolderError> {
+    let folder = TrainingFolder::open(root)?;
+    folder.paths().sweep(Writer::Submitter).map_err(|source| FolderError::Io { path: root.to_owned(), source })?;
     let id = format!("{}-{}", config.name(), request.kind.name());
-    let job = Job {
+    let job = TrainingJob {
         client_id: id.clone(),
         id,
         kind: request.kind,
@@ -56,14 +57,14 @@ pub fn make(root: &Path, config: &Config, request: &JobRequest) -> Result<(Folde
         examples: request.examples,
         seed: request.seed,
         threads: Some(request.threads),
-        submitted_unix_s: now,
+        submitted_unix_s: now_unix_s(),
     };
     folder.set_job(&job)?;
     let mut text = config.text().to_owned();
     for file in config.files() {
         text = bring(root, file, text)?;
     }
-    let scene = root.join("scene.toml");
+    let scene = folder.paths().scene();
     write_atomically(&scene, text.as_bytes()).map_err(|source| FolderError::Io { path: scene, source })?;
     Ok((folder, job))
 }
@@ -104,7 +105,7 @@ pub fn begin(root: &Path) -> std::io::Result<Standing> {
 }
 
 /// Notes how it ended, and why.
-pub fn end(root: &Path, begun: Standing, result: &anyhow::Result<Report>) -> std::io::Result<()> {
+pub fn end(root: &Path, begun: Standing, result: &anyhow::Result<TrainingReport>) -> std::io::Result<()> {
     let (state, reason) = match result {
         Ok(_) => (JobState::Done, None),
         Err(error) => match error.downcast_ref() {

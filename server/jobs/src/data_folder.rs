@@ -4,10 +4,8 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
+use plica_training::now_unix_s;
 use serde::{Deserialize, Serialize};
-
-use crate::clock::now_unix_s;
-use crate::files::to_json;
 
 /// Why a data folder is not used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -96,7 +94,8 @@ fn sign(lock: &mut File, session: &str) -> io::Result<()> {
     let owner = Owner { pid: std::process::id(), session: session.to_owned(), started_unix_s: now_unix_s() };
     lock.set_len(0)?;
     lock.rewind()?;
-    lock.write_all(&to_json(&owner))
+    serde_json::to_writer_pretty(&*lock, &owner)?;
+    lock.write_all(b"\n")
 }
 
 fn owner(lock: &mut File) -> String {

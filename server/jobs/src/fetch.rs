@@ -52,7 +52,7 @@ fn sha256(file: &mut File) -> io::Result<String> {
     let (mut hash, mut buffer) = (Sha256::new(), vec![0; CHUNK_BYTES]);
     loop {
         match file.read(&mut buffer)? {
-            0 => return Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()),
+            0 => return Ok(plica_training::hexadecimal(&hash.finalize())),
             n => hash.update(&buffer[..n]),
         }
     }

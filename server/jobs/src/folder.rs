@@ -7,10 +7,9 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use plica_protocol::jobs::{JobFile, JobState};
-use plica_training::{Job, Progress, Stage};
+use plica_training::{JobPaths, TrainingJob, TrainingProgress, TrainingStage, write_json_atomically};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-
-use crate::files::{read_json, to_json, write_atomically};
 
 /// How much of the end of a log is looked at.
 const TAIL_BYTES: u64 = 4096;
@@ -41,77 +40,76 @@ impl Standing {
 
 /// A job's folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct JobFolder(PathBuf);
+pub struct JobFolder(JobPaths);
 
 impl JobFolder {
     /// The folder at a path, which need not exist yet.
     pub fn new(path: PathBuf) -> Self {
-        Self(path)
+        Self(JobPaths::new(path))
     }
 
     /// The folder.
     pub fn path(&self) -> &Path {
+        self.0.root()
+    }
+
+    /// Paths of its files.
+    pub fn paths(&self) -> &JobPaths {
         &self.0
     }
 
     /// Where the scene is.
     pub fn scene(&self) -> PathBuf {
-        self.0.join("scene.toml")
+        self.0.scene()
     }
 
     /// Where the process writes its log.
     pub fn log(&self) -> PathBuf {
-        self.0.join("log.txt")
+        self.0.log()
     }
 
     /// Where a result is, once the job is done.
     pub fn result(&self, file: JobFile) -> PathBuf {
-        self.0.join(match file {
-            JobFile::Database => "database.safetensors",
-            JobFile::Report => "report.json",
-        })
+        match file {
+            JobFile::Database => self.0.database(),
+            JobFile::Report => self.0.report(),
+        }
     }
 
     /// Reads `job.json`; the error is a sentence.
-    pub fn job(&self) -> Result<Job, String> {
-        read_json(&self.0.join("job.json"))
+    pub fn job(&self) -> Result<TrainingJob, String> {
+        read_json(&self.0.job())
     }
 
     /// Writes `job.json`.
-    pub fn write_job(&self, job: &Job) -> io::Result<()> {
-        write_atomically(&self.0.join("job.json"), &to_json(job))
+    pub fn write_job(&self, job: &TrainingJob) -> io::Result<()> {
+        write_json_atomically(&self.0.job(), job)
     }
 
     /// Reads `state.json`; the error is a sentence.
     pub fn standing(&self) -> Result<Standing, String> {
-        read_json(&self.0.join("state.json"))
+        read_json(&self.0.state())
     }
 
     /// Writes `state.json`.
     pub fn write_standing(&self, standing: &Standing) -> io::Result<()> {
-        write_atomically(&self.0.join("state.json"), &to_json(standing))
+        write_json_atomically(&self.0.state(), standing)
     }
 
     /// What `progress.json` says; `None` before there is one. A process that begins anew says that nothing is finished
     /// until it has read what is there: then the examples on disk are counted.
-    pub fn progress(&self) -> Option<Progress> {
-        let progress: Progress = read_json(&self.0.join("progress.json")).ok()?;
-        if progress.stage != Stage::Interactions {
+    pub fn progress(&self) -> Option<TrainingProgress> {
+        let progress: TrainingProgress = read_json(&self.0.progress()).ok()?;
+        if progress.stage != TrainingStage::Interactions {
             return Some(progress);
         }
-        let (done, rejected) = (self.count(".safetensors"), self.count(".rejected.json"));
-        Some(Progress { done, rejected, ..progress })
-    }
-
-    fn count(&self, ending: &str) -> u32 {
-        let is_one = |name: &str| name.ends_with(ending) && !name.starts_with('.');
-        let entries = fs::read_dir(self.0.join("examples")).into_iter().flatten().flatten();
-        entries.filter(|entry| entry.file_name().to_str().is_some_and(is_one)).count() as u32
+        let (done, rejected) = self.0.count_finished();
+        Some(TrainingProgress { done, rejected, ..progress })
     }
 
     /// Whether a process works in it, one started by hand or one that is still ending: it holds a lock.
     pub fn is_busy(&self) -> bool {
-        let lock = fs::File::open(self.0.join(".lock"));
+        let lock = fs::File::open(self.0.lock());
         lock.is_ok_and(|lock| matches!(lock.try_lock(), Err(fs::TryLockError::WouldBlock)))
     }
 
@@ -124,6 +122,12 @@ impl JobFolder {
         file.take(TAIL_BYTES).read_to_end(&mut tail).ok()?;
         last_line(&String::from_utf8_lossy(&tail))
     }
+}
+
+/// Reads a JSON file; the error is a sentence that names it.
+fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, String> {
+    let text = fs::read(path).map_err(|e| format!("{} cannot be read: {e}", path.display()))?;
+    serde_json::from_slice(&text).map_err(|e| format!("{} is not what it should be: {e}", path.display()))
 }
 
 fn last_line(text: &str) -> Option<String> {
@@ -151,20 +155,20 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let job = JobFolder::new(folder.path().to_owned());
         job.write_standing(&Standing::queued()).unwrap();
-        let text = fs::read_to_string(folder.path().join("state.json")).unwrap();
+        let text = fs::read_to_string(job.paths().state()).unwrap();
         let json: serde_json::Value = serde_json::from_str(&text).unwrap();
         let keys: Vec<_> = json.as_object().unwrap().keys().map(String::as_str).collect();
         assert_eq!(keys, ["finished_unix_s", "pid", "reason", "started_unix_s", "state"]);
         assert_eq!(job.standing().unwrap(), Standing::queued());
         let progress = r#"{"stage": "examples", "done": 3, "rejected": 1, "total": 8, "seconds_left": null}"#;
-        fs::write(folder.path().join("progress.json"), progress).unwrap();
+        fs::write(job.paths().progress(), progress).unwrap();
         let progress = job.progress().unwrap();
         assert_eq!((progress.done, progress.rejected, progress.total), (3, 1, 8));
         let beginning = r#"{"stage": "interactions", "done": 0, "rejected": 0, "total": 8, "seconds_left": null}"#;
-        fs::write(folder.path().join("progress.json"), beginning).unwrap();
-        fs::create_dir(folder.path().join("examples")).unwrap();
+        fs::write(job.paths().progress(), beginning).unwrap();
+        fs::create_dir(job.paths().examples()).unwrap();
         for name in ["00000.safetensors", "00003.safetensors", "00001.rejected.json", ".00002.safetensors.tmp"] {
-            fs::write(folder.path().join("examples").join(name), "").unwrap();
+            fs::write(job.paths().examples().join(name), "").unwrap();
         }
         let progress = job.progress().unwrap();
         assert_eq!((progress.done, progress.rejected, progress.total), (2, 1, 8), "what is on disk");
@@ -177,7 +181,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let job = JobFolder::new(folder.path().to_owned());
         assert!(!job.is_busy());
-        let held = plica_training::Folder::open(folder.path()).unwrap();
+        let held = plica_training::TrainingFolder::open(folder.path()).unwrap();
         assert!(job.is_busy());
         drop(held);
         assert!(!job.is_busy());

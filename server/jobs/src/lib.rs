@@ -4,11 +4,9 @@
 //! simulation thread knows nothing of either.
 
 pub mod by_hand;
-mod clock;
 mod data_folder;
 mod error;
 mod fetch;
-mod files;
 mod folder;
 mod priority;
 mod process;
@@ -30,6 +28,7 @@ use plica_protocol::jobs::{
     Job, JobFetchRequest, JobFile, JobListReply, JobState, JobStatus, JobSubmitReply, JobSubmitRequest, MAX_IN_STATUS,
 };
 use plica_protocol::rpc::ErrorReply;
+use plica_training::now_unix_s;
 
 pub use data_folder::{DataFolder, DataFolderError, default_path};
 pub use error::JobError;
@@ -38,7 +37,6 @@ pub use priority::{Priority, lower};
 pub use process::Launch;
 pub use scene::ServedScene;
 
-use clock::now_unix_s;
 use fetch::Sums;
 use store::Store;
 use supervisor::Supervisor;

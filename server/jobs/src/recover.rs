@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use plica_protocol::jobs::JobState;
+use plica_training::Writer;
 
 use crate::folder::{JobFolder, Standing};
 use crate::store::{Entry, Found, Store};
@@ -35,6 +36,9 @@ fn read(path: &Path) -> Result<Found, String> {
     let order = folder.job()?;
     if path.file_name().is_none_or(|name| name != order.id.as_str()) {
         return Err(format!("its job.json says that it is job {}", order.id));
+    }
+    if let Err(problem) = folder.paths().sweep(Writer::Submitter) {
+        tracing::warn!("{}: leftovers cannot be removed: {problem}", path.display());
     }
     let written = folder.standing();
     if let Err(problem) = &written {

@@ -6,24 +6,12 @@ use std::path::{Component, Path, PathBuf};
 use plica_protocol::jobs::JobSubmitRequest;
 use plica_scene::Config;
 use plica_scene::scene::named_files;
+use plica_training::{JobPaths, write_atomically};
 
 use crate::error::JobError;
-use crate::files::write_and_sync;
 
 /// Largest file that a job takes along.
 const MAX_FILE_BYTES: u64 = 64 << 20;
-
-/// What a job's folder holds already.
-const OWN_NAMES: [&str; 8] = [
-    "job.json",
-    "scene.toml",
-    "state.json",
-    "progress.json",
-    "log.txt",
-    "examples",
-    "database.safetensors",
-    "report.json",
-];
 
 /// The scene that the daemon serves, as it was read.
 #[derive(Debug, Clone)]
@@ -59,12 +47,12 @@ impl JobScene {
     }
 
     /// Writes `scene.toml` and what it names into a job's folder.
-    pub(crate) fn write(&self, folder: &Path) -> std::io::Result<()> {
-        write_and_sync(&folder.join("scene.toml"), self.text.as_bytes())?;
+    pub(crate) fn write(&self, paths: &JobPaths) -> std::io::Result<()> {
+        write_atomically(&paths.scene(), self.text.as_bytes())?;
         for (path, bytes) in &self.files {
-            let path = folder.join(path);
-            fs::create_dir_all(path.parent().unwrap_or(folder))?;
-            write_and_sync(&path, bytes)?;
+            let path = paths.root().join(path);
+            fs::create_dir_all(path.parent().unwrap_or(paths.root()))?;
+            write_atomically(&path, bytes)?;
         }
         Ok(())
     }
@@ -111,7 +99,7 @@ fn read_file(name: &str, folder: Option<&Path>) -> Result<Vec<u8>, JobError> {
 fn is_plain(name: &str) -> bool {
     let mut parts = Path::new(name).components();
     let down = !name.is_empty() && parts.clone().all(|part| matches!(part, Component::Normal(_)));
-    down && parts.next().is_some_and(|first| !OWN_NAMES.iter().any(|own| first.as_os_str() == *own))
+    down && parts.next().is_some_and(|first| !JobPaths::is_reserved(first.as_os_str()))
 }
 
 #[cfg(test)]
@@ -146,10 +134,11 @@ mod tests {
         let (folder, job) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let served = served(folder.path());
         let scene = JobScene::new(&JobSubmitRequest::new("a", JobKind::Training), &served).unwrap();
-        scene.write(job.path()).unwrap();
+        let paths = JobPaths::new(job.path().to_owned());
+        scene.write(&paths).unwrap();
         assert_eq!(fs::read_to_string(job.path().join("tools/rod.obj")).unwrap(), TETRAHEDRON);
-        assert_eq!(fs::read_to_string(job.path().join("scene.toml")).unwrap(), served.text);
-        Config::from_file(&job.path().join("scene.toml")).unwrap();
+        assert_eq!(fs::read_to_string(paths.scene()).unwrap(), served.text);
+        Config::from_file(&paths.scene()).unwrap();
         assert_eq!(JobScene::new(&submitted(with_mesh("tools/rod.obj")), &served).unwrap().name, "mine");
     }
 

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use plica_protocol::jobs::{Job, JobListReply, JobState, MAX_LISTED};
-use plica_training::{Job as Order, Progress};
+use plica_training::{TrainingJob, TrainingProgress};
 
 use crate::error::JobError;
 use crate::folder::{JobFolder, Standing};
@@ -18,10 +18,10 @@ use crate::view;
 #[derive(Debug, Clone)]
 pub(crate) struct Entry {
     pub(crate) folder: JobFolder,
-    pub(crate) order: Order,
+    pub(crate) order: TrainingJob,
     pub(crate) standing: Standing,
     /// What the process has said of itself.
-    pub(crate) progress: Option<Progress>,
+    pub(crate) progress: Option<TrainingProgress>,
 }
 
 /// A job of an earlier daemon.
@@ -156,7 +156,7 @@ impl Store {
     }
 
     /// What a job's process says of itself.
-    pub(crate) fn tell(&self, number: u32, progress: Progress) {
+    pub(crate) fn tell(&self, number: u32, progress: TrainingProgress) {
         let mut table = self.lock();
         let version = table.version + 1;
         let Some(row) = table.rows.get_mut(&number).filter(|row| row.entry.progress != Some(progress)) else { return };

@@ -2,15 +2,12 @@
 
 use std::fs;
 use std::io;
-use std::num::NonZero;
 use std::path::Path;
 
 use plica_protocol::jobs::{JobSubmitReply, JobSubmitRequest};
-use plica_training::Job as Order;
+use plica_training::{TrainingJob, default_threads, now_unix_s, sync_folder};
 
-use crate::clock::now_unix_s;
 use crate::error::JobError;
-use crate::files::sync_folder;
 use crate::folder::{JobFolder, Standing};
 use crate::recover::SUBMITTING;
 use crate::scene::{JobScene, ServedScene};
@@ -61,27 +58,21 @@ fn same(entry: &Entry, request: &JobSubmitRequest) -> Result<(), JobError> {
     }
 }
 
-fn order(request: &JobSubmitRequest, scene: &JobScene, id: String) -> Order {
-    Order {
+fn order(request: &JobSubmitRequest, scene: &JobScene, id: String) -> TrainingJob {
+    TrainingJob {
         id,
         client_id: request.client_id.clone(),
         kind: view::training_kind(request.kind),
         scene_name: scene.name.clone(),
         examples: request.examples,
         seed: request.seed,
-        threads: request.threads.or_else(default_threads),
+        threads: request.threads.or_else(|| Some(default_threads())),
         submitted_unix_s: now_unix_s(),
     }
 }
 
-/// All cores but one, which the simulation needs.
-fn default_threads() -> Option<u32> {
-    let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
-    u32::try_from(cores.saturating_sub(1).max(1)).ok()
-}
-
 /// Makes the folder beside its place and moves it there: it is complete, or not there.
-fn make(jobs: &Path, folder: &JobFolder, scene: &JobScene, order: &Order, standing: &Standing) -> io::Result<()> {
+fn make(jobs: &Path, folder: &JobFolder, scene: &JobScene, order: &TrainingJob, standing: &Standing) -> io::Result<()> {
     let path = jobs.join(SUBMITTING);
     let made = fill(&JobFolder::new(path.clone()), scene, order, standing);
     let made = made.and_then(|()| fs::rename(&path, folder.path())).and_then(|()| sync_folder(jobs));
@@ -91,12 +82,12 @@ fn make(jobs: &Path, folder: &JobFolder, scene: &JobScene, order: &Order, standi
     made
 }
 
-fn fill(folder: &JobFolder, scene: &JobScene, order: &Order, standing: &Standing) -> io::Result<()> {
+fn fill(folder: &JobFolder, scene: &JobScene, order: &TrainingJob, standing: &Standing) -> io::Result<()> {
     if folder.path().exists() {
         fs::remove_dir_all(folder.path())?;
     }
     fs::create_dir(folder.path())?;
-    scene.write(folder.path())?;
+    scene.write(folder.paths())?;
     folder.write_standing(standing)?;
     folder.write_job(order)
 }

@@ -11,8 +11,8 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
 use plica_protocol::jobs::{JobFile, JobState};
+use plica_training::now_unix_s;
 
-use crate::clock::now_unix_s;
 use crate::folder::{JobFolder, Standing};
 use crate::process::{Launch, Process};
 use crate::reason::reason;

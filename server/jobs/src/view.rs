@@ -1,26 +1,30 @@
 //! Jobs as clients see them.
 
 use plica_protocol::jobs::{Job, JobKind, Progress};
-use plica_training::Stage;
+use plica_training::TrainingStage;
 
 use crate::folder::Standing;
 
 /// What a job makes.
-pub(crate) fn training_kind(kind: JobKind) -> plica_training::JobKind {
+pub(crate) fn training_kind(kind: JobKind) -> plica_training::DatabaseKind {
     match kind {
-        JobKind::Training => plica_training::JobKind::Training,
-        JobKind::Evaluation => plica_training::JobKind::Evaluation,
+        JobKind::Training => plica_training::DatabaseKind::Training,
+        JobKind::Evaluation => plica_training::DatabaseKind::Evaluation,
     }
 }
 
 /// A job: what was asked, where it stands, what its process has said.
-pub(crate) fn job(order: &plica_training::Job, standing: &Standing, progress: Option<plica_training::Progress>) -> Job {
+pub(crate) fn job(
+    order: &plica_training::TrainingJob,
+    standing: &Standing,
+    progress: Option<plica_training::TrainingProgress>,
+) -> Job {
     Job {
         id: order.id.clone(),
         client_id: order.client_id.clone(),
         kind: match order.kind {
-            plica_training::JobKind::Training => JobKind::Training,
-            plica_training::JobKind::Evaluation => JobKind::Evaluation,
+            plica_training::DatabaseKind::Training => JobKind::Training,
+            plica_training::DatabaseKind::Evaluation => JobKind::Evaluation,
         },
         scene_name: order.scene_name.clone(),
         examples: order.examples,
@@ -35,12 +39,12 @@ pub(crate) fn job(order: &plica_training::Job, standing: &Standing, progress: Op
     }
 }
 
-fn job_progress(progress: plica_training::Progress) -> Progress {
-    let plica_training::Progress { stage, done, rejected, total, seconds_left } = progress;
+fn job_progress(progress: plica_training::TrainingProgress) -> Progress {
+    let plica_training::TrainingProgress { stage, done, rejected, total, seconds_left } = progress;
     let stage = match stage {
-        Stage::Interactions => "interactions",
-        Stage::Examples => "examples",
-        Stage::Database => "database",
+        TrainingStage::Interactions => "interactions",
+        TrainingStage::Examples => "examples",
+        TrainingStage::Database => "database",
     };
     Progress { stage: Some(stage.to_owned()), done, rejected, total, seconds_left }
 }

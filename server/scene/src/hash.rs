@@ -115,7 +115,7 @@ fn mesh_file(config: &Config, tool: &str) -> Result<Value, HashError> {
     let key = format!("tools.{tool}.shape.mesh.file");
     let Some(file) = config.files().iter().find(|f| f.key == key) else { return Ok(Value::Null) };
     let bytes = std::fs::read(&file.path).map_err(|source| HashError { key, path: file.path.clone(), source })?;
-    let digits: String = Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect();
+    let digits = plica_training::hexadecimal(&Sha256::digest(bytes));
     Ok(json!({ "mesh_sha256": digits, "metres_per_unit": file.metres_per_unit }))
 }
 

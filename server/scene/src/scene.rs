@@ -191,7 +191,7 @@ fn check_enrichment(
     raw: &RawConfig,
     training: &TrainingConfig,
 ) -> Result<EnrichmentConfig, ConfigError> {
-    let (_, object) = raw.objects.first_key_value().expect("the object was checked before");
+    let (name, object) = raw.objects.first_key_value().expect("the object was checked before");
     enrichment::check(c, &format!("objects.{name}.enrichment"), &object.enrichment, training.stamp_axes)
 }
 

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::coarse::{Cancelled, Interrupted};
 use crate::error::BuildError;
 use crate::setup::AccurateDescription;
-use crate::way::Way;
+use crate::tool_path::ToolPath;
 
 /// Largest force left at a free coordinate, as a share of the largest nodal force.
 const TOLERANCE: f64 = 1e-8;
@@ -151,7 +151,7 @@ impl Accurate {
         Ok(AccurateResult { offsets: self.offsets(&x), tool_force, solve: solve? })
     }
 
-    /// From rest, with the model's own unilateral frictional contact: the tool goes its way.
+    /// From rest, with the model's own unilateral frictional contact: the tool follows `path`.
     ///
     /// # Errors
     /// See [`AccurateFailure`].
@@ -159,14 +159,14 @@ impl Accurate {
         &mut self,
         obstacle: &Obstacle,
         friction: f64,
-        way: &Way,
+        path: &ToolPath,
         cancelled: Cancelled<'_>,
     ) -> Result<AccurateResult, AccurateFailure> {
         let mut x = self.rest.clone();
         if self.weight.is_some() {
             self.minimise(&[], &mut x, cancelled)?;
         }
-        let (start, path) = (way.poses()[0], &way.poses()[1..]);
+        let (start, waypoints) = (path.poses()[0], &path.poses()[1..]);
         let mut state = ContactState::untouched(&self.surface, &start, &x);
         let energies: Vec<&dyn Energy> = energies(&self.solid, &self.weight, &[]);
         let setting = Press {
@@ -178,10 +178,11 @@ impl Accurate {
             params: self.contact,
         };
         let mut watch = |_| stop_if(cancelled());
-        let info = setting.follow(path, &mut self.solver, &mut state, &mut x, &mut watch).map_err(|e| match e {
-            ContactError::Cancelled { .. } => AccurateFailure::Interrupted,
-            other => AccurateFailure::Failed(other.to_string()),
-        })?;
+        let info =
+            setting.follow(waypoints, &mut self.solver, &mut state, &mut x, &mut watch).map_err(|e| match e {
+                ContactError::Cancelled { .. } => AccurateFailure::Interrupted,
+                other => AccurateFailure::Failed(other.to_string()),
+            })?;
         let solve = SolveInfo {
             iterations: info.newton_iterations,
             indefinite_steps: info.indefinite_steps,

@@ -7,7 +7,7 @@ use plica_sim::{
 };
 
 use crate::setup::DriveOptions;
-use crate::way::Way;
+use crate::tool_path::ToolPath;
 
 /// Every so many ticks somebody is asked whether to go on.
 const TICKS_PER_QUESTION: u64 = 32;
@@ -84,37 +84,37 @@ impl Coarse {
         &self.model
     }
 
-    /// From rest: `tool` goes its way and is held until the object has settled.
+    /// From rest: `tool` follows `path` and is held until the object has settled.
     ///
     /// # Errors
     /// [`Interrupted`].
     pub fn press(
         &mut self,
         tool: usize,
-        way: &Way,
+        path: &ToolPath,
         drive: &DriveOptions,
         cancelled: Cancelled<'_>,
     ) -> Result<CoarseResult, Interrupted> {
         self.restart();
-        self.go_on(tool, way, drive, cancelled)
+        self.go_on(tool, path, drive, cancelled)
     }
 
-    /// The same from the present state, in which the tool is where the way begins.
+    /// The same from the present state, in which the tool is at the start of `path`.
     ///
     /// # Errors
     /// [`Interrupted`].
     pub fn go_on(
         &mut self,
         tool: usize,
-        way: &Way,
+        path: &ToolPath,
         drive: &DriveOptions,
         cancelled: Cancelled<'_>,
     ) -> Result<CoarseResult, Interrupted> {
-        let n_ticks = (way.length_m() / (drive.speed_m_per_s * self.model.timestep_s())).ceil() as u64;
+        let n_ticks = (path.length_m() / (drive.speed_m_per_s * self.model.timestep_s())).ceil() as u64;
         for k in 0..=n_ticks {
-            self.tick(Some((tool, way.at(k as f64 / n_ticks.max(1) as f64))), cancelled)?;
+            self.tick(Some((tool, path.at(k as f64 / n_ticks.max(1) as f64))), cancelled)?;
         }
-        let settling = self.settle(Some((tool, *way.end())), drive, cancelled)?;
+        let settling = self.settle(Some((tool, *path.end())), drive, cancelled)?;
         let reading = &self.state.tools()[tool];
         let contact_point = reading.in_contact.then_some(reading.reference_contact_point_m);
         Ok(self.result(contact_point, reading.contact_force_n, settling))

@@ -11,6 +11,7 @@ use plica_accurate::TIE_VERSION;
 use serde::{Deserialize, Serialize};
 
 use crate::example::{Example, Record, Rejection};
+use plica_sim::enrichment::Examples;
 
 /// What the metadata calls the format.
 pub const FORMAT: &str = "plica-examples";
@@ -37,6 +38,19 @@ pub struct Database {
     pub rejected: Vec<Rejection>,
 }
 
+impl Database {
+    /// The first `n` examples, or all if there are fewer, as enrichment takes them. A training database is in farthest-point
+    /// order, so that any leading part covers the region.
+    pub fn leading_examples(&self, n: usize) -> Examples {
+        let taken = &self.examples[..n.min(self.examples.len())];
+        Examples {
+            displacements: taken.iter().map(|e| e.displacements.clone()).collect(),
+            details: taken.iter().map(|e| e.detail.clone()).collect(),
+            touches: taken.iter().map(Example::touch).collect(),
+        }
+    }
+}
+
 /// What holds for all examples of a database.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -44,7 +58,7 @@ pub struct About {
     /// The scene they belong to.
     pub scene_hash: String,
     /// What they are for.
-    pub kind: JobKind,
+    pub kind: DatabaseKind,
     /// Seed of the interactions.
     pub seed: u64,
     /// What random numbers are.
@@ -58,14 +72,14 @@ pub struct About {
 /// What examples are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum JobKind {
+pub enum DatabaseKind {
     /// Examples to learn from.
     Training,
     /// Held-out interactions that are never trained on.
     Evaluation,
 }
 
-impl JobKind {
+impl DatabaseKind {
     /// As in files.
     pub fn name(self) -> &'static str {
         match self {
@@ -77,7 +91,7 @@ impl JobKind {
 
 impl About {
     /// Of a database made by this version of the program.
-    pub fn new(scene_hash: &str, kind: JobKind, seed: u64) -> Self {
+    pub fn new(scene_hash: &str, kind: DatabaseKind, seed: u64) -> Self {
         Self {
             scene_hash: scene_hash.to_owned(),
             kind,

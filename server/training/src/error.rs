@@ -7,9 +7,6 @@ use plica_accurate::{SolidError, SolveError};
 use plica_geometry::{EmbeddingError, HullError};
 use plica_sim::ModelError;
 
-/// Exit code of a process whose job was interrupted: finished examples are kept.
-pub const INTERRUPTED: u8 = 75;
-
 /// Why there are no interactions.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
@@ -105,6 +102,9 @@ pub enum TrainingError {
         reason: String,
     },
 }
+
+/// Exit code of a process that ends with [`TrainingError::Interrupted`].
+pub const INTERRUPTED: u8 = 75;
 
 /// What to do about a full disk.
 fn advice(error: &std::io::Error) -> &'static str {

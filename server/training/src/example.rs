@@ -7,6 +7,7 @@ use crate::accurate::SolveInfo;
 use crate::coarse::Settling;
 use crate::interaction::Interaction;
 use plica_geometry::ContactFrame;
+use plica_sim::enrichment::Touch;
 
 /// One interaction solved by both models. What is large is `f32`, as the run-time phase uses it.
 #[derive(Debug, Clone, PartialEq)]
@@ -155,6 +156,12 @@ pub enum Outcome {
 }
 
 impl Example {
+    /// Contact point and tool origin.
+    pub fn touch(&self) -> Touch {
+        let [x, y, z, ..] = self.tool_pose;
+        Touch { contact_point: self.contact_point.into(), tool_origin: Point3::new(x, y, z) }
+    }
+
     /// Whether every number is finite.
     pub fn is_finite(&self) -> bool {
         let large = [Some(&self.displacements), Some(&self.detail), self.independent_detail.as_ref()];

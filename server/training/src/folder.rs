@@ -1,33 +1,27 @@
-//! The folder of a job: what was asked, what is finished, what came of it. Everything in it is written atomically.
-//!
-//! ```text
-//! job.json              what was asked; written once, by whoever submits
-//! progress.json         after every interaction
-//! examples/00007.safetensors, examples/00007.rejected.json
-//! database.safetensors, report.json
-//! ```
+//! The folder of a job as the process that trains holds it: locked, its request checked, its results stored atomically.
 
 use std::fs::{self, File, TryLockError};
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::database::{About, Database, DatabaseError, JobKind};
+use crate::atomic_file::write_json_atomically;
+use crate::database::{About, Database, DatabaseError, DatabaseKind};
 use crate::error::TrainingError;
 use crate::example::{Example, Outcome, Rejection};
-use crate::files::{remove_leftovers, write_atomically};
+use crate::job_folder::{JobPaths, Writer};
 
 /// What a job was asked for, `job.json`. What is left out is the scene's to say.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Job {
+pub struct TrainingJob {
     /// Name of the job.
     pub id: String,
     /// Chosen by the client that submitted it.
     pub client_id: String,
     /// What the examples are for.
-    pub kind: JobKind,
+    pub kind: DatabaseKind,
     /// Name of the scene, for people.
     pub scene_name: String,
     /// How many examples; of an evaluation: in the trained region.
@@ -46,9 +40,9 @@ pub struct Job {
 /// Where a job stands, `progress.json`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Progress {
+pub struct TrainingProgress {
     /// What it is at.
-    pub stage: Stage,
+    pub stage: TrainingStage,
     /// Examples that are on the disk.
     pub done: u32,
     /// Interactions that gave none.
@@ -62,7 +56,7 @@ pub struct Progress {
 /// What a job is at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Stage {
+pub enum TrainingStage {
     /// Draws interactions and builds the models.
     Interactions,
     /// Solves them.
@@ -73,25 +67,26 @@ pub enum Stage {
 
 /// The folder of a job.
 #[derive(Debug)]
-pub struct Folder {
-    root: PathBuf,
+pub struct TrainingFolder {
+    paths: JobPaths,
     /// Held while the folder is open: two processes at one job would do everything twice.
     _lock: File,
 }
 
-impl Folder {
+impl TrainingFolder {
     /// Opens the folder, makes what it lacks, and clears away what a killed process left half written.
     ///
     /// # Errors
     /// It cannot be written, or another process works in it.
     pub fn open(root: &Path) -> Result<Self, TrainingError> {
-        let examples = root.join("examples");
+        let paths = JobPaths::new(root.to_owned());
+        let examples = paths.examples();
         let at = |path: &Path| {
             let path = path.to_owned();
             move |error| TrainingError::Io { path, error }
         };
         fs::create_dir_all(&examples).map_err(at(&examples))?;
-        let lock_path = root.join(".lock");
+        let lock_path = paths.lock();
         let lock = File::create(&lock_path).map_err(at(&lock_path))?;
         lock.try_lock().map_err(|e| match e {
             TryLockError::WouldBlock => TrainingError::File {
@@ -100,32 +95,21 @@ impl Folder {
             },
             TryLockError::Error(error) => TrainingError::Io { path: lock_path.clone(), error },
         })?;
-        remove_leftovers(root).map_err(at(root))?;
-        remove_leftovers(&examples).map_err(at(&examples))?;
-        Ok(Self { root: root.to_owned(), _lock: lock })
+        paths.sweep(Writer::Process).map_err(at(root))?;
+        Ok(Self { paths, _lock: lock })
     }
 
-    /// Where it is.
-    pub fn path(&self) -> &Path {
-        &self.root
-    }
-
-    /// Where the database is, or will be.
-    pub fn database(&self) -> PathBuf {
-        self.root.join("database.safetensors")
-    }
-
-    /// Where the report is, or will be.
-    pub fn report(&self) -> PathBuf {
-        self.root.join("report.json")
+    /// Paths of its files.
+    pub fn paths(&self) -> &JobPaths {
+        &self.paths
     }
 
     /// What was asked.
     ///
     /// # Errors
     /// `job.json` is missing or not what it should be.
-    pub fn job(&self) -> Result<Job, TrainingError> {
-        let path = self.root.join("job.json");
+    pub fn job(&self) -> Result<TrainingJob, TrainingError> {
+        let path = self.paths.job();
         match read_json(&path)? {
             Some(job) => Ok(job),
             None => Err(TrainingError::File { path, problem: "is missing: this is no job folder".into() }),
@@ -136,10 +120,10 @@ impl Folder {
     ///
     /// # Errors
     /// It cannot be written, or belongs to another job.
-    pub fn set_job(&self, job: &Job) -> Result<(), TrainingError> {
-        let path = self.root.join("job.json");
-        let asks = |j: &Job| (j.kind, j.examples, j.seed);
-        if let Some(found) = read_json::<Job>(&path)?.filter(|found| asks(found) != asks(job)) {
+    pub fn set_job(&self, job: &TrainingJob) -> Result<(), TrainingError> {
+        let path = self.paths.job();
+        let asks = |j: &TrainingJob| (j.kind, j.examples, j.seed);
+        if let Some(found) = read_json::<TrainingJob>(&path)?.filter(|found| asks(found) != asks(job)) {
             let problem = format!(
                 "the folder holds another job ({} {:?} with seed {:?}); choose another folder, or remove this one",
                 found.kind.name(),
@@ -148,15 +132,15 @@ impl Folder {
             );
             return Err(TrainingError::File { path, problem });
         }
-        self.write_json(&path, job)
+        write_json(&path, job)
     }
 
     /// States where the job stands.
     ///
     /// # Errors
     /// It cannot be written.
-    pub fn set_progress(&self, progress: &Progress) -> Result<(), TrainingError> {
-        self.write_json(&self.root.join("progress.json"), progress)
+    pub fn set_progress(&self, progress: &TrainingProgress) -> Result<(), TrainingError> {
+        write_json(&self.paths.progress(), progress)
     }
 
     /// Writes the report.
@@ -164,7 +148,7 @@ impl Folder {
     /// # Errors
     /// It cannot be written.
     pub fn set_report(&self, report: &impl Serialize) -> Result<(), TrainingError> {
-        self.write_json(&self.report(), report)
+        write_json(&self.paths.report(), report)
     }
 
     /// Puts a finished interaction on the disk.
@@ -174,13 +158,13 @@ impl Folder {
     pub fn store(&self, about: &About, outcome: &Outcome) -> Result<(), TrainingError> {
         match outcome {
             Outcome::Accepted(example) => {
-                let path = self.example(example.record.index);
+                let path = self.paths.example(example.record.index);
                 let one = Database { about: about.clone(), examples: vec![(**example).clone()], rejected: Vec::new() };
                 one.write(&path).map_err(|e| from_database(e, &path))
             }
             Outcome::Rejected(rejection) => {
                 let stored = StoredRejection { about: about.clone(), rejection: rejection.clone() };
-                self.write_json(&self.rejection(rejection.index), &stored)
+                write_json(&self.paths.rejection(rejection.index), &stored)
             }
         }
     }
@@ -190,7 +174,7 @@ impl Folder {
     /// # Errors
     /// It belongs to another scene, version or plan: going on would mix two jobs.
     pub fn finished(&self, about: &About, index: u32, fingerprint: &str) -> Result<Option<Outcome>, TrainingError> {
-        let path = self.example(index);
+        let path = self.paths.example(index);
         let (path, found, outcome) = if path.exists() {
             match self.read_example(&path)? {
                 Some((found, example)) => {
@@ -199,7 +183,7 @@ impl Folder {
                 None => return Ok(None),
             }
         } else {
-            let path = self.rejection(index);
+            let path = self.paths.rejection(index);
             match read_json::<StoredRejection>(&path) {
                 Ok(Some(StoredRejection { about, rejection })) => {
                     (path, (about, rejection.interaction_sha256.clone()), Outcome::Rejected(rejection))
@@ -226,21 +210,6 @@ impl Folder {
             Err(error) => Err(from_database(error, path)),
         }
     }
-
-    fn example(&self, index: u32) -> PathBuf {
-        self.root.join("examples").join(format!("{index:05}.safetensors"))
-    }
-
-    fn rejection(&self, index: u32) -> PathBuf {
-        self.root.join("examples").join(format!("{index:05}.rejected.json"))
-    }
-
-    fn write_json(&self, path: &Path, value: &impl Serialize) -> Result<(), TrainingError> {
-        let at = |error| TrainingError::Io { path: path.to_owned(), error };
-        let mut text = serde_json::to_vec_pretty(value).map_err(|e| at(io::Error::other(e)))?;
-        text.push(b'\n');
-        write_atomically(path, &text).map_err(at)
-    }
 }
 
 /// A rejection as it lies beside the examples.
@@ -256,6 +225,10 @@ pub(crate) fn from_database(error: DatabaseError, path: &Path) -> TrainingError 
         DatabaseError::Io { path, error } => TrainingError::Io { path, error },
         other => TrainingError::File { path: path.to_owned(), problem: other.to_string() },
     }
+}
+
+fn write_json(path: &Path, value: &impl Serialize) -> Result<(), TrainingError> {
+    write_json_atomically(path, value).map_err(|error| TrainingError::Io { path: path.to_owned(), error })
 }
 
 /// `None` if there is no such file.

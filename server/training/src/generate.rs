@@ -1,26 +1,23 @@
 //! The job itself: plan, solve in parallel, assemble.
 
+use std::ops::ControlFlow;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::Instant;
 
-use crate::database::{About, Database, JobKind};
+use crate::database::{About, Database, DatabaseKind};
 use crate::error::{PlanError, TrainingError};
 use crate::example::Outcome;
-use crate::folder::{Folder, Job, Progress, Stage, from_database};
+use crate::folder::{TrainingFolder, TrainingJob, TrainingProgress, TrainingStage, from_database};
 use crate::interaction::Interaction;
 use crate::plan::plan;
-use crate::report::{Report, Run};
+use crate::report::{Run, TrainingReport};
 use crate::setup::{InteractionSet, Setup};
 use crate::tandem::Tandem;
 
-/// Who watches a job.
-pub trait Watch: Sync {
-    /// After every interaction, and when the stage changes.
-    fn progress(&self, progress: &Progress);
-    /// Asked before every Newton step and every few ticks; true ends the job.
-    fn cancelled(&self) -> bool;
-}
+/// Observer of a job: called when the stage changes, after every interaction, before every Newton step and every few ticks.
+/// `Break` ends the job at its next Newton step or tick; if none is left to solve, the job is finished all the same.
+pub type Observer<'a> = &'a mut (dyn FnMut(TrainingProgress) -> ControlFlow<()> + Send);
 
 /// Runs the job of `folder` on `n_threads` threads, or goes on with it. The database does not depend on their number, nor on
 /// how often the job was ended and begun again.
@@ -29,19 +26,19 @@ pub trait Watch: Sync {
 /// See [`TrainingError`]. Finished examples are kept in any case.
 pub fn run(
     setup: &Setup,
-    job: &Job,
+    job: &TrainingJob,
     n_threads: usize,
-    folder: &Folder,
-    watch: &dyn Watch,
-) -> Result<Report, TrainingError> {
+    folder: &TrainingFolder,
+    observer: Observer<'_>,
+) -> Result<TrainingReport, TrainingError> {
     let begin = Instant::now();
     let (sets, seed) = ask(setup, job);
     let about = About::new(&setup.scene_hash, job.kind, seed);
     let total = sets.iter().map(|set| set.count as u32).sum();
-    let start = Progress { stage: Stage::Interactions, done: 0, rejected: 0, total, seconds_left: None };
-    tell(folder, watch, &start)?;
+    let mut tally = Tally::new(folder, observer, total, n_threads);
+    tally.announce(TrainingStage::Interactions)?;
     let interactions = plan(setup, &sets, seed)?;
-    let tally = Tally::new(folder, watch, interactions.len() as u32, n_threads);
+    tally.total = interactions.len() as u32;
     let fingerprints: Vec<String> = interactions.iter().map(|i| setup.fingerprint(i)).collect();
     let mut open = Vec::new();
     for (index, expected) in fingerprints.iter().enumerate() {
@@ -50,14 +47,14 @@ pub fn run(
             None => open.push(index),
         }
     }
-    tally.report()?;
+    tally.announce(TrainingStage::Examples)?;
     let n_resumed = interactions.len() - open.len();
     let n_threads = n_threads.clamp(1, open.len().max(1));
     let work = Work { setup, interactions: &interactions, open: &open, about: &about, kind: job.kind };
-    let sizes = work.run(n_threads, folder, watch, &tally)?;
-    tell(folder, watch, &Progress { stage: Stage::Database, seconds_left: Some(0.0), ..tally.now() })?;
+    let sizes = work.run(n_threads, folder, &tally)?;
+    tally.announce(TrainingStage::Database)?;
     let database = assemble(folder, &about, &fingerprints)?;
-    let path = folder.database();
+    let path = folder.paths().database();
     let nothing = || PlanError::AllRejected { n: database.rejected.len(), first: first_message(&database) };
     if database.examples.is_empty() {
         return Err(nothing().into());
@@ -70,16 +67,16 @@ pub fn run(
         resumed: n_resumed,
         ..tally.times()
     };
-    let report = Report::new(setup, &database, interactions.len(), sizes, run);
+    let report = TrainingReport::new(setup, &database, interactions.len(), sizes, run);
     folder.set_report(&report)?;
     Ok(report)
 }
 
 /// Sets and seed: the scene's, unless the job says otherwise.
-fn ask(setup: &Setup, job: &Job) -> (Vec<InteractionSet>, u64) {
+fn ask(setup: &Setup, job: &TrainingJob) -> (Vec<InteractionSet>, u64) {
     let (mut sets, seed) = match job.kind {
-        JobKind::Training => (vec![setup.training.clone()], setup.training_seed),
-        JobKind::Evaluation => (setup.evaluation.clone(), setup.evaluation_seed),
+        DatabaseKind::Training => (vec![setup.training.clone()], setup.training_seed),
+        DatabaseKind::Evaluation => (setup.evaluation.clone(), setup.evaluation_seed),
     };
     if let (Some(examples), Some(first)) = (job.examples, sets.first_mut()) {
         first.count = examples as usize;
@@ -93,7 +90,7 @@ struct Work<'a> {
     interactions: &'a [Interaction],
     open: &'a [usize],
     about: &'a About,
-    kind: JobKind,
+    kind: DatabaseKind,
 }
 
 impl Work<'_> {
@@ -101,19 +98,18 @@ impl Work<'_> {
     fn run(
         &self,
         n_threads: usize,
-        folder: &Folder,
-        watch: &dyn Watch,
+        folder: &TrainingFolder,
         tally: &Tally<'_>,
     ) -> Result<(usize, usize), TrainingError> {
         let threads = |e: rayon::ThreadPoolBuildError| TrainingError::Threads { n_threads, reason: e.to_string() };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().map_err(threads)?;
         let (next, failed) = (AtomicUsize::new(0), AtomicUsize::new(0));
-        let cancelled = || watch.cancelled() || failed.load(Relaxed) > 0;
+        let cancelled = || tally.is_cancelled() || failed.load(Relaxed) > 0;
         let worker = |_: rayon::BroadcastContext<'_>| {
             let mut tandem = Tandem::new(self.setup)?;
             while let Some(&index) = self.open.get(next.fetch_add(1, Relaxed)) {
                 let begin = Instant::now();
-                let two = self.kind == JobKind::Evaluation;
+                let two = self.kind == DatabaseKind::Evaluation;
                 let outcome = tandem.solve(index as u32, &self.interactions[index], two, &cancelled);
                 let outcome = outcome.map_err(|_| TrainingError::Interrupted)?;
                 folder.store(self.about, &outcome)?;
@@ -136,7 +132,7 @@ impl Work<'_> {
 }
 
 /// Examples in the order of the plan, from the disk: those of earlier runs and of this one alike.
-fn assemble(folder: &Folder, about: &About, fingerprints: &[String]) -> Result<Database, TrainingError> {
+fn assemble(folder: &TrainingFolder, about: &About, fingerprints: &[String]) -> Result<Database, TrainingError> {
     let mut database = Database { about: about.clone(), examples: Vec::new(), rejected: Vec::new() };
     for (index, expected) in fingerprints.iter().enumerate() {
         match folder.finished(about, index as u32, expected)? {
@@ -144,7 +140,7 @@ fn assemble(folder: &Folder, about: &About, fingerprints: &[String]) -> Result<D
             Some(Outcome::Rejected(rejection)) => database.rejected.push(rejection),
             None => {
                 let problem = format!("interaction {index} was finished and is gone or damaged; run the job again");
-                return Err(TrainingError::File { path: folder.path().to_owned(), problem });
+                return Err(TrainingError::File { path: folder.paths().root().to_owned(), problem });
             }
         }
     }
@@ -155,19 +151,19 @@ fn first_message(database: &Database) -> String {
     database.rejected.first().map_or_else(String::new, |r| r.message.clone())
 }
 
-fn tell(folder: &Folder, watch: &dyn Watch, progress: &Progress) -> Result<(), TrainingError> {
-    folder.set_progress(progress)?;
-    watch.progress(progress);
-    Ok(())
-}
-
-/// Counts what is finished, and how long it took.
+/// Counts what is finished, times it, and reports it to the folder and the observer.
 struct Tally<'a> {
-    folder: &'a Folder,
-    watch: &'a dyn Watch,
+    folder: &'a TrainingFolder,
     total: u32,
     n_threads: usize,
-    counts: Mutex<Counts>,
+    shared: Mutex<Shared<'a>>,
+}
+
+/// State that threads change in turn, so that progress never runs backwards.
+struct Shared<'a> {
+    counts: Counts,
+    observer: Observer<'a>,
+    is_cancelled: bool,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -178,50 +174,69 @@ struct Counts {
 }
 
 impl<'a> Tally<'a> {
-    fn new(folder: &'a Folder, watch: &'a dyn Watch, total: u32, n_threads: usize) -> Self {
-        Self { folder, watch, total, n_threads, counts: Mutex::new(Counts::default()) }
+    fn new(folder: &'a TrainingFolder, observer: Observer<'a>, total: u32, n_threads: usize) -> Self {
+        let shared = Shared { counts: Counts::default(), observer, is_cancelled: false };
+        Self { folder, total, n_threads, shared: Mutex::new(shared) }
     }
 
-    fn counts(&self) -> std::sync::MutexGuard<'_, Counts> {
-        self.counts.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    fn shared(&self) -> std::sync::MutexGuard<'_, Shared<'a>> {
+        self.shared.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
     }
 
     fn found(&self, outcome: &Outcome) {
-        self.counts().count(outcome);
+        self.shared().counts.count(outcome);
     }
 
     fn solved(&self, outcome: &Outcome, seconds: f64) -> Result<(), TrainingError> {
-        let mut counts = self.counts();
-        counts.count(outcome);
-        counts.seconds.push(seconds);
-        // Told under the lock, so that progress never runs backwards.
-        tell(self.folder, self.watch, &self.progress(&counts))
+        let mut shared = self.shared();
+        shared.counts.count(outcome);
+        shared.counts.seconds.push(seconds);
+        self.report(&mut shared, TrainingStage::Examples)
     }
 
-    fn report(&self) -> Result<(), TrainingError> {
-        tell(self.folder, self.watch, &self.now())
+    fn announce(&self, stage: TrainingStage) -> Result<(), TrainingError> {
+        self.report(&mut self.shared(), stage)
     }
 
-    fn now(&self) -> Progress {
-        self.progress(&self.counts())
+    fn report(&self, shared: &mut Shared<'_>, stage: TrainingStage) -> Result<(), TrainingError> {
+        let progress = self.progress(&shared.counts, stage);
+        self.folder.set_progress(&progress)?;
+        shared.observe(progress);
+        Ok(())
     }
 
-    fn progress(&self, counts: &Counts) -> Progress {
+    fn is_cancelled(&self) -> bool {
+        let mut shared = self.shared();
+        let progress = self.progress(&shared.counts, TrainingStage::Examples);
+        shared.observe(progress);
+        shared.is_cancelled
+    }
+
+    fn progress(&self, counts: &Counts, stage: TrainingStage) -> TrainingProgress {
         let left = self.total.saturating_sub(counts.done + counts.rejected);
         let mean = |seconds: &[f64]| seconds.iter().sum::<f64>() / seconds.len() as f64;
-        let seconds_left = (!counts.seconds.is_empty())
-            .then(|| mean(&counts.seconds) * f64::from(left) / self.n_threads.max(1) as f64);
+        let seconds_left = match stage {
+            TrainingStage::Database => Some(0.0),
+            _ => (!counts.seconds.is_empty())
+                .then(|| mean(&counts.seconds) * f64::from(left) / self.n_threads.max(1) as f64),
+        };
         let (done, rejected, total) = (counts.done, counts.rejected, self.total);
-        Progress { stage: Stage::Examples, done, rejected, total, seconds_left }
+        TrainingProgress { stage, done, rejected, total, seconds_left }
     }
 
     fn times(&self) -> Run {
-        let seconds = &self.counts().seconds;
+        let seconds = &self.shared().counts.seconds;
         Run {
             mean_s: (!seconds.is_empty()).then(|| seconds.iter().sum::<f64>() / seconds.len() as f64),
             max_s: seconds.iter().copied().reduce(f64::max),
             ..Run::default()
         }
+    }
+}
+
+impl Shared<'_> {
+    fn observe(&mut self, progress: TrainingProgress) {
+        self.is_cancelled |= (self.observer)(progress).is_break();
     }
 }
 

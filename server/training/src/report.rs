@@ -6,18 +6,18 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use crate::accurate::SolveInfo;
-use crate::database::{Database, JobKind};
+use crate::database::{Database, DatabaseKind};
 use crate::example::{Example, Record, Rejection};
 use crate::setup::Setup;
 use plica_geometry::ReferenceSkin;
 
 /// What a job did.
 #[derive(Debug, Clone, Serialize)]
-pub struct Report {
+pub struct TrainingReport {
     /// The scene.
     pub scene_hash: String,
     /// What the examples are for.
-    pub kind: JobKind,
+    pub kind: DatabaseKind,
     /// Seed of the interactions.
     pub seed: u64,
     /// The same on every machine, up to rounding.
@@ -106,7 +106,7 @@ pub struct Run {
     pub max_s: Option<f64>,
 }
 
-impl Report {
+impl TrainingReport {
     /// Of a finished job; `sizes` are free unknowns and factor values of the accurate model.
     pub(crate) fn new(
         setup: &Setup,

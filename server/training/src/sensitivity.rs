@@ -1,7 +1,10 @@
-//! How firm `d` is: how far the accurate skin moves when what should not matter is changed.
+//! Sensitivity of `d`: how far the accurate skin moves with mesh, tie stiffness and reference.
 //!
 //! Interactions are drawn as for evaluation. The coarse model settles once at each; the accurate skin is then found on finer
 //! and coarser meshes, with softer and stiffer ties, and with contact of its own.
+
+use std::ops::ControlFlow;
+use std::sync::Mutex;
 
 use nalgebra::Vector3;
 use plica_accurate::TieOptions;
@@ -10,7 +13,6 @@ use serde::Serialize;
 
 use crate::accurate::AccurateResult;
 use crate::error::TrainingError;
-use crate::generate::Watch;
 use crate::interaction::Interaction;
 use crate::plan::plan;
 use crate::report::Spread;
@@ -81,7 +83,8 @@ struct Variant {
     skins: Vec<Option<AccurateResult>>,
 }
 
-/// Runs all variations on `n_threads` threads. `said` hears what is about to be solved.
+/// Runs all variations on `n_threads` threads. `observer` is called with the name of the variant before its first solve and
+/// before every Newton step; `Break` ends the run.
 ///
 /// # Errors
 /// See [`TrainingError`].
@@ -89,14 +92,13 @@ pub fn sensitivity(
     setup: &Setup,
     variations: &Variations,
     n_threads: usize,
-    watch: &dyn Watch,
-    said: &(dyn Fn(&str) + Sync),
+    observer: &mut (dyn FnMut(&str) -> ControlFlow<()> + Send),
 ) -> Result<Sensitivity, TrainingError> {
     let set = InteractionSet { count: variations.n_interactions, ..setup.evaluation[0].clone() };
     let interactions = plan(setup, &[set], setup.evaluation_seed)?;
     let threads = |e: rayon::ThreadPoolBuildError| TrainingError::Threads { n_threads, reason: e.to_string() };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads.max(1)).build().map_err(threads)?;
-    let bench = Bench { setup, interactions: &interactions, watch, said, pool: &pool };
+    let bench = Bench { setup, interactions: &interactions, observer: Mutex::new(observer), pool: &pool };
     let mut left_out = Vec::new();
     let halves = bench.halves(&mut left_out)?;
     let one = &|tandem: &mut Tandem<'_>, half: &CoarseHalf, _: &Interaction, stop: &(dyn Fn() -> bool + Sync)| {
@@ -142,20 +144,27 @@ type Solve<'a> = &'a (
             + Sync
     );
 
+/// Called with the name of a variant.
+type Observer<'a> = &'a mut (dyn FnMut(&str) -> ControlFlow<()> + Send);
+
 /// What all variants share.
 struct Bench<'a> {
     setup: &'a Setup,
     interactions: &'a [Interaction],
-    watch: &'a dyn Watch,
-    said: &'a (dyn Fn(&str) + Sync),
+    observer: Mutex<Observer<'a>>,
     pool: &'a rayon::ThreadPool,
 }
 
 impl Bench<'_> {
+    fn is_cancelled(&self, name: &str) -> bool {
+        let mut observer = self.observer.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        observer(name).is_break()
+    }
+
     fn halves(&self, left_out: &mut Vec<String>) -> Result<Vec<Option<CoarseHalf>>, TrainingError> {
-        (self.said)("coarse model");
+        let stop = || self.is_cancelled("coarse model");
+        stop();
         let mut tandem = Tandem::new(self.setup)?;
-        let stop = || self.watch.cancelled();
         let halves = self.interactions.iter().map(|at| tandem.solve_coarse(at, &stop));
         halves.enumerate().map(|(i, half)| keep("coarse", i, half, left_out)).collect()
     }
@@ -168,8 +177,8 @@ impl Bench<'_> {
         solve: Solve<'_>,
         left_out: &mut Vec<String>,
     ) -> Result<Variant, TrainingError> {
-        (self.said)(name);
-        let stop = || self.watch.cancelled();
+        let stop = || self.is_cancelled(name);
+        stop();
         let per_thread = halves.len().div_ceil(self.pool.current_num_threads()).max(1);
         let solve_chunk = |(first, chunk): (usize, &[Option<CoarseHalf>])| -> Result<Vec<_>, TrainingError> {
             let mut tandem = Tandem::new(setup)?;

@@ -5,15 +5,15 @@ use plica_accurate::contact::Obstacle;
 use plica_accurate::{Tie, TieTarget};
 
 use crate::accurate::{Accurate, AccurateFailure, AccurateResult, SolveInfo};
-use crate::band::{around_tool, under_disc};
 use crate::coarse::{Cancelled, Coarse, CoarseResult, Interrupted};
 use crate::error::BuildError;
 use crate::example::{Example, Outcome, Reason, Record, Rejection, difference, numbers, rows, to_f32};
 use crate::interaction::{Action, Interaction, to_numbers};
-use crate::lift::{Disc, lift};
 use crate::obstacle::obstacle;
 use crate::setup::Setup;
-use crate::way::Way;
+use crate::suction::{Disc, lift};
+use crate::tie_targets::{around_tool, under_disc};
+use crate::tool_path::ToolPath;
 use plica_geometry::{ReferenceSkin, SurfacePoint};
 
 /// A result with an element below this `det F` is not stored.
@@ -46,8 +46,8 @@ pub struct CoarseHalf {
 /// What acts on the object.
 #[derive(Debug, Clone)]
 pub enum Load {
-    /// A tool that went this way.
-    Tool(Way),
+    /// A tool after this path.
+    Tool(ToolPath),
     /// Forces at skin vertices, `[n_skin]` \[N\].
     Suction(Vec<nalgebra::Vector3<f64>>),
 }
@@ -197,20 +197,20 @@ impl<'a> Tandem<'a> {
     fn press_coarse(&mut self, interaction: &Interaction, cancelled: Cancelled<'_>) -> Result<CoarseHalf, Stop> {
         let (tool, setup) = (interaction.tool as usize, self.setup);
         let nothing = || Stop::Rejected(Reason::NothingTouched, "the tool passes the object by".into());
-        let way = Way::of(interaction, &self.obstacles[tool], &self.skin).ok_or_else(nothing)?;
-        let state = self.coarse.press(tool, &way, &setup.drive, cancelled)?;
-        self.under_tool(tool, way, state).ok_or_else(nothing)
+        let path = ToolPath::of(interaction, &self.obstacles[tool], &self.skin).ok_or_else(nothing)?;
+        let state = self.coarse.press(tool, &path, &setup.drive, cancelled)?;
+        self.under_tool(tool, path, state).ok_or_else(nothing)
     }
 
     /// `None` if nothing is touched.
-    fn under_tool(&self, tool: usize, way: Way, state: CoarseResult) -> Option<CoarseHalf> {
+    fn under_tool(&self, tool: usize, path: ToolPath, state: CoarseResult) -> Option<CoarseHalf> {
         let contact = self.skin.nearest(&state.contact_point?);
-        let targets = around_tool(&self.skin, &state.offsets, &self.obstacles[tool], way.end(), &self.setup.tie);
+        let targets = around_tool(&self.skin, &state.offsets, &self.obstacles[tool], path.end(), &self.setup.tie);
         let is_touched = !targets.is_empty();
-        is_touched.then(|| CoarseHalf { contact, pose: *way.end(), targets, load: Load::Tool(way), state })
+        is_touched.then(|| CoarseHalf { contact, pose: *path.end(), targets, load: Load::Tool(path), state })
     }
 
-    /// The coarse model settles at one pose after the other, on one way from rest. `None` where nothing is touched.
+    /// Settles at each pose in turn, starting from the previous one; the first from rest. `None` where nothing is touched.
     ///
     /// # Errors
     /// [`Interrupted`].
@@ -223,12 +223,12 @@ impl<'a> Tandem<'a> {
     ) -> Result<(), Interrupted> {
         let drive = self.setup.drive;
         for (i, pose) in poses.iter().enumerate() {
-            let way = Way::new(poses[i.saturating_sub(1)..i].iter().chain([pose]).copied().collect());
+            let path = ToolPath::new(poses[i.saturating_sub(1)..i].iter().chain([pose]).copied().collect());
             let state = match i {
-                0 => self.coarse.press(tool, &way, &drive, cancelled)?,
-                _ => self.coarse.go_on(tool, &way, &drive, cancelled)?,
+                0 => self.coarse.press(tool, &path, &drive, cancelled)?,
+                _ => self.coarse.go_on(tool, &path, &drive, cancelled)?,
             };
-            let half = self.under_tool(tool, way, state);
+            let half = self.under_tool(tool, path, state);
             each(self, half)?;
         }
         Ok(())
@@ -284,7 +284,7 @@ impl<'a> Tandem<'a> {
         let friction = self.setup.coarse.tools[tool].friction;
         let result = match &half.load {
             Load::Suction(forces) => self.accurate.loaded(forces, cancelled),
-            Load::Tool(way) => self.accurate.pressed(&self.obstacles[tool], friction, way, cancelled),
+            Load::Tool(path) => self.accurate.pressed(&self.obstacles[tool], friction, path, cancelled),
         };
         accept(result, Reason::IndependentNotConverged, Reason::IndependentInverted)
     }

@@ -41,7 +41,7 @@ fn example(index: u32, two_references: bool) -> Example {
 
 fn database(two_references: bool) -> Database {
     Database {
-        about: About::new(HASH, if two_references { JobKind::Evaluation } else { JobKind::Training }, 42),
+        about: About::new(HASH, if two_references { DatabaseKind::Evaluation } else { DatabaseKind::Training }, 42),
         examples: vec![example(0, two_references), example(2, two_references)],
         rejected: vec![Rejection {
             index: 1,

@@ -10,18 +10,9 @@ use plica_training::evaluation::*;
 use plica_training::*;
 use tempfile::TempDir;
 
-struct Patient;
-
-impl Watch for Patient {
-    fn progress(&self, _: &plica_training::Progress) {}
-    fn cancelled(&self) -> bool {
-        false
-    }
-}
-
-fn train(setup: &Setup, kind: JobKind) -> Database {
+fn train(setup: &Setup, kind: DatabaseKind) -> Database {
     let folder = TempDir::new().unwrap();
-    let job = Job {
+    let job = TrainingJob {
         id: "test".into(),
         client_id: "test".into(),
         kind,
@@ -31,7 +22,7 @@ fn train(setup: &Setup, kind: JobKind) -> Database {
         threads: None,
         submitted_unix_s: 0,
     };
-    run(setup, &job, 2, &Folder::open(folder.path()).unwrap(), &Patient).unwrap();
+    run(setup, &job, 2, &TrainingFolder::open(folder.path()).unwrap(), &mut |_| ControlFlow::Continue(())).unwrap();
     Database::read(&folder.path().join("database.safetensors"), Some(&setup.scene_hash)).unwrap()
 }
 
@@ -47,7 +38,7 @@ fn setup() -> Setup {
 #[test]
 fn every_method_is_judged_by_the_same_states() {
     let setup = setup();
-    let (training, held_out) = (train(&setup, JobKind::Training), train(&setup, JobKind::Evaluation));
+    let (training, held_out) = (train(&setup, DatabaseKind::Training), train(&setup, DatabaseKind::Evaluation));
     let n_examples = training.examples.len();
     assert!(n_examples >= 18, "{:?}", training.rejected);
     let judge = Judge::new(&setup, &training, &held_out).unwrap();
@@ -110,7 +101,7 @@ fn databases_of_another_model_and_empty_regions_are_refused() {
     small.training.count = 2;
     small.evaluation[0].count = 1;
     small.evaluation.truncate(2);
-    let (training, held_out) = (train(&small, JobKind::Training), train(&small, JobKind::Evaluation));
+    let (training, held_out) = (train(&small, DatabaseKind::Training), train(&small, DatabaseKind::Evaluation));
     let mut cut = held_out.clone();
     cut.examples[1].detail.pop();
     let message = Judge::new(&setup, &training, &cut).err().unwrap().to_string();
@@ -130,7 +121,7 @@ fn databases_of_another_model_and_empty_regions_are_refused() {
 fn another_coarse_model_is_compared_with_the_same_accurate_skins() {
     let mut setup = setup();
     setup.training.count = 2;
-    let (training, held_out) = (train(&setup, JobKind::Training), train(&setup, JobKind::Evaluation));
+    let (training, held_out) = (train(&setup, DatabaseKind::Training), train(&setup, DatabaseKind::Evaluation));
     let coarse = Judge::new(&setup, &training, &held_out).unwrap().coarse().unwrap();
     let told = AtomicUsize::new(0);
     let done = || {
@@ -169,7 +160,7 @@ fn a_slide_is_smooth_where_the_accurate_solution_is() {
     let mut setup = setup();
     setup.evaluation.truncate(1);
     setup.evaluation[0].count = 1;
-    let (training, held_out) = (train(&setup, JobKind::Training), train(&setup, JobKind::Evaluation));
+    let (training, held_out) = (train(&setup, DatabaseKind::Training), train(&setup, DatabaseKind::Evaluation));
     let judge = Judge::new(&setup, &training, &held_out).unwrap();
     let chosen: Vec<Method> = methods(setup.stamp_axes).into_iter().filter(|m| m.name != "rbf-vector").collect();
     let found = slide(&setup, &judge, &chosen, usize::MAX, &mut |_| ControlFlow::Continue(())).unwrap();

@@ -4,38 +4,43 @@
 mod common;
 
 use std::fs;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::ops::ControlFlow;
 
 use plica_geometry::ReferenceSkin;
 use plica_training::*;
 use tempfile::TempDir;
 
-/// Counts progress, and ends the job after so many questions.
+/// Collects reports of progress, and ends the job after a number of calls.
 struct Counting {
-    questions_left: AtomicUsize,
-    told: AtomicUsize,
+    calls_left: usize,
+    reports: Vec<TrainingProgress>,
 }
 
 impl Counting {
     fn patient() -> Self {
         Self::until(usize::MAX)
     }
-    fn until(questions: usize) -> Self {
-        Self { questions_left: AtomicUsize::new(questions), told: AtomicUsize::new(0) }
+
+    fn until(calls: usize) -> Self {
+        Self { calls_left: calls, reports: Vec::new() }
+    }
+
+    fn observe(&mut self, progress: TrainingProgress) -> ControlFlow<()> {
+        if self.reports.last() != Some(&progress) {
+            self.reports.push(progress);
+        }
+        match self.calls_left.checked_sub(1) {
+            Some(left) => {
+                self.calls_left = left;
+                ControlFlow::Continue(())
+            }
+            None => ControlFlow::Break(()),
+        }
     }
 }
 
-impl Watch for Counting {
-    fn progress(&self, _: &Progress) {
-        self.told.fetch_add(1, Relaxed);
-    }
-    fn cancelled(&self) -> bool {
-        self.questions_left.fetch_update(Relaxed, Relaxed, |n| n.checked_sub(1)).is_err()
-    }
-}
-
-fn job(kind: JobKind, examples: Option<u32>) -> Job {
-    Job {
+fn job(kind: DatabaseKind, examples: Option<u32>) -> TrainingJob {
+    TrainingJob {
         id: "test".into(),
         client_id: "test".into(),
         kind,
@@ -50,11 +55,11 @@ fn job(kind: JobKind, examples: Option<u32>) -> Job {
 fn train(
     setup: &Setup,
     folder: &TempDir,
-    kind: JobKind,
+    kind: DatabaseKind,
     n_threads: usize,
-    watch: &dyn Watch,
-) -> Result<Report, TrainingError> {
-    run(setup, &job(kind, None), n_threads, &Folder::open(folder.path()).unwrap(), watch)
+    watch: &mut Counting,
+) -> Result<TrainingReport, TrainingError> {
+    run(setup, &job(kind, None), n_threads, &TrainingFolder::open(folder.path()).unwrap(), &mut |p| watch.observe(p))
 }
 
 fn bytes(folder: &TempDir) -> Vec<u8> {
@@ -65,23 +70,25 @@ fn bytes(folder: &TempDir) -> Vec<u8> {
 fn the_database_depends_on_neither_threads_nor_interruptions() {
     let setup = common::tiny();
     let (one, two, broken) = (TempDir::new().unwrap(), TempDir::new().unwrap(), TempDir::new().unwrap());
-    let watch = Counting::patient();
-    let report = train(&setup, &one, JobKind::Training, 1, &watch).unwrap();
+    let mut watch = Counting::patient();
+    let report = train(&setup, &one, DatabaseKind::Training, 1, &mut watch).unwrap();
     assert_eq!((report.result.interactions, report.result.examples), (4, 4), "{:?}", report.result.rejected);
-    assert!(watch.told.load(Relaxed) >= 6, "start, every example, end");
-    train(&setup, &two, JobKind::Training, 2, &Counting::patient()).unwrap();
+    assert!(watch.reports.len() >= 6, "start, every example, end");
+    let counts: Vec<u32> = watch.reports.iter().map(|p| p.done).collect();
+    assert!(counts.is_sorted() && counts.last() == Some(&4), "{counts:?}");
+    train(&setup, &two, DatabaseKind::Training, 2, &mut Counting::patient()).unwrap();
     assert!(bytes(&one) == bytes(&two), "one thread and two differ");
 
     let mut stops = 0;
     for questions in [5, 40, 75, 100, 130, 1_000_000] {
-        match train(&setup, &broken, JobKind::Training, 1, &Counting::until(questions)) {
+        match train(&setup, &broken, DatabaseKind::Training, 1, &mut Counting::until(questions)) {
             Err(TrainingError::Interrupted) => stops += 1,
             other => drop(other.unwrap()),
         }
     }
     assert!(stops >= 3, "interrupted {stops} times");
     assert!(bytes(&one) == bytes(&broken), "an interrupted job differs");
-    let again = train(&setup, &broken, JobKind::Training, 1, &Counting::patient()).unwrap();
+    let again = train(&setup, &broken, DatabaseKind::Training, 1, &mut Counting::patient()).unwrap();
     assert_eq!((again.run.solved, again.run.resumed), (0, 4), "finished examples are not repeated");
     assert!(bytes(&one) == bytes(&broken));
 }
@@ -90,7 +97,7 @@ fn the_database_depends_on_neither_threads_nor_interruptions() {
 fn an_example_is_what_it_says() {
     let setup = common::tiny();
     let folder = TempDir::new().unwrap();
-    train(&setup, &folder, JobKind::Training, 2, &Counting::patient()).unwrap();
+    train(&setup, &folder, DatabaseKind::Training, 2, &mut Counting::patient()).unwrap();
     let database = Database::read(&folder.path().join("database.safetensors"), Some(&setup.scene_hash)).unwrap();
     let skin = ReferenceSkin::new(&setup.coarse.skin);
     for example in &database.examples {
@@ -118,7 +125,7 @@ fn an_example_is_what_it_says() {
 fn an_evaluation_holds_both_references_of_every_kind() {
     let setup = common::tiny();
     let folder = TempDir::new().unwrap();
-    let report = train(&setup, &folder, JobKind::Evaluation, 2, &Counting::patient()).unwrap();
+    let report = train(&setup, &folder, DatabaseKind::Evaluation, 2, &mut Counting::patient()).unwrap();
     let database = Database::read(&folder.path().join("database.safetensors"), None).unwrap();
     println!("{}", serde_json::to_string_pretty(&report.result).unwrap());
     let kinds: Vec<_> = database.examples.iter().map(|e| e.record.kind.as_str()).collect();
@@ -156,7 +163,7 @@ fn what_cannot_be_solved_is_listed_and_not_stored() {
     // Evaluation takes several sets; their second reference would take long on the absurd one, which never gets there.
     setup.evaluation = vec![set(1, &absurd), set(1, ranges)];
     let folder = TempDir::new().unwrap();
-    let report = train(&setup, &folder, JobKind::Evaluation, 1, &Counting::patient()).unwrap();
+    let report = train(&setup, &folder, DatabaseKind::Evaluation, 1, &mut Counting::patient()).unwrap();
     assert_eq!((report.result.examples, report.result.rejected.len()), (1, 1));
     let rejected = &report.result.rejected[0];
     println!("{:?}: {}", rejected.reason, rejected.message);
@@ -167,7 +174,7 @@ fn what_cannot_be_solved_is_listed_and_not_stored() {
     assert_eq!(database.examples[0].record.index, 1);
     assert_eq!(database.rejected, report.result.rejected);
     assert!(folder.path().join("examples/00000.rejected.json").exists());
-    let again = train(&setup, &folder, JobKind::Evaluation, 1, &Counting::patient()).unwrap();
+    let again = train(&setup, &folder, DatabaseKind::Evaluation, 1, &mut Counting::patient()).unwrap();
     assert_eq!((again.run.solved, again.run.resumed), (0, 2), "a rejection is not tried again");
 }
 
@@ -178,7 +185,7 @@ fn a_job_without_an_example_fails_and_says_why() {
     setup.drive.window_s = 0.01;
     (setup.drive.settled_m, setup.drive.tolerated_m) = (0.0, 0.0);
     let folder = TempDir::new().unwrap();
-    let message = train(&setup, &folder, JobKind::Training, 1, &Counting::patient()).unwrap_err().to_string();
+    let message = train(&setup, &folder, DatabaseKind::Training, 1, &mut Counting::patient()).unwrap_err().to_string();
     assert!(message.contains("all 4 interactions were rejected") && message.contains("moves by"), "{message}");
     assert!(!folder.path().join("database.safetensors").exists());
 }
@@ -187,16 +194,19 @@ fn a_job_without_an_example_fails_and_says_why() {
 fn a_folder_of_another_scene_or_plan_is_refused() {
     let setup = common::tiny();
     let folder = TempDir::new().unwrap();
-    train(&setup, &folder, JobKind::Training, 2, &Counting::patient()).unwrap();
-    let refused = |setup: &Setup, kind| train(setup, &folder, kind, 1, &Counting::patient()).unwrap_err().to_string();
+    train(&setup, &folder, DatabaseKind::Training, 2, &mut Counting::patient()).unwrap();
+    let refused =
+        |setup: &Setup, kind| train(setup, &folder, kind, 1, &mut Counting::patient()).unwrap_err().to_string();
     let other = Setup { scene_hash: "1".repeat(64), ..setup.clone() };
-    let message = refused(&other, JobKind::Training);
+    let message = refused(&other, DatabaseKind::Training);
     assert!(message.contains("another scene") && message.contains("00000.safetensors"), "{message}");
     let other = Setup { training_seed: 9, ..setup.clone() };
-    assert!(refused(&other, JobKind::Training).contains("another plan"));
-    assert!(refused(&setup, JobKind::Evaluation).contains("another plan"));
-    let locked = Folder::open(folder.path()).unwrap();
-    assert!(Folder::open(folder.path()).unwrap_err().to_string().contains("another process works in this folder"));
+    assert!(refused(&other, DatabaseKind::Training).contains("another plan"));
+    assert!(refused(&setup, DatabaseKind::Evaluation).contains("another plan"));
+    let locked = TrainingFolder::open(folder.path()).unwrap();
+    assert!(
+        TrainingFolder::open(folder.path()).unwrap_err().to_string().contains("another process works in this folder")
+    );
     drop(locked);
 }
 
@@ -205,13 +215,13 @@ fn a_folder_of_another_scene_or_plan_is_refused() {
 fn damaged_examples_are_made_again() {
     let setup = common::tiny();
     let folder = TempDir::new().unwrap();
-    train(&setup, &folder, JobKind::Training, 2, &Counting::patient()).unwrap();
+    train(&setup, &folder, DatabaseKind::Training, 2, &mut Counting::patient()).unwrap();
     let first = bytes(&folder);
     let path = folder.path().join("examples/00001.safetensors");
     let example = fs::read(&path).unwrap();
     fs::write(&path, &example[..example.len() - 7]).unwrap();
     fs::write(folder.path().join("examples/.00002.safetensors.tmp"), b"half").unwrap();
-    let report = train(&setup, &folder, JobKind::Training, 1, &Counting::patient()).unwrap();
+    let report = train(&setup, &folder, DatabaseKind::Training, 1, &mut Counting::patient()).unwrap();
     assert_eq!((report.run.solved, report.run.resumed), (1, 3));
     assert!(bytes(&folder) == first);
     assert!(!folder.path().join("examples/.00002.safetensors.tmp").exists());
@@ -221,14 +231,15 @@ fn damaged_examples_are_made_again() {
 fn a_folder_that_cannot_be_written_is_named() {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("file"), "").unwrap();
-    let message = Folder::open(&folder.path().join("file/job")).unwrap_err().to_string();
+    let message = TrainingFolder::open(&folder.path().join("file/job")).unwrap_err().to_string();
     assert!(message.contains("file/job"), "{message}");
     // The examples of a folder that breaks while the job runs: what is finished stays.
     let setup = common::tiny();
-    let job_folder = Folder::open(folder.path()).unwrap();
+    let job_folder = TrainingFolder::open(folder.path()).unwrap();
     fs::remove_dir(folder.path().join("examples")).unwrap();
     fs::write(folder.path().join("examples"), "no folder").unwrap();
-    let error = run(&setup, &job(JobKind::Training, None), 1, &job_folder, &Counting::patient()).unwrap_err();
+    let error = run(&setup, &job(DatabaseKind::Training, None), 1, &job_folder, &mut |_| ControlFlow::Continue(()))
+        .unwrap_err();
     assert!(matches!(error, TrainingError::Io { .. }), "{error}");
 }
 
@@ -237,9 +248,9 @@ fn a_folder_that_cannot_be_written_is_named() {
 fn examples_that_were_driven_otherwise_are_not_taken_over() {
     let setup = common::tiny();
     let folder = TempDir::new().unwrap();
-    train(&setup, &folder, JobKind::Training, 2, &Counting::patient()).unwrap();
+    train(&setup, &folder, DatabaseKind::Training, 2, &mut Counting::patient()).unwrap();
     let mut other = setup.clone();
     other.drive.speed_m_per_s *= 2.0;
-    let message = train(&other, &folder, JobKind::Training, 1, &Counting::patient()).unwrap_err().to_string();
+    let message = train(&other, &folder, DatabaseKind::Training, 1, &mut Counting::patient()).unwrap_err().to_string();
     assert!(message.contains("another plan"), "{message}");
 }

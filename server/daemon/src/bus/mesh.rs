@@ -41,7 +41,7 @@ impl Mesh {
         let mut normals = vec![[0.0; 3]; surface.rest.len()];
         vertex_normals_into(&surface.triangles, &surface.rest, &mut normals);
         let glb = glb_bytes(&surface.rest, &normals, skin.triangles());
-        let sha256 = Sha256::digest(&glb).iter().map(|byte| format!("{byte:02x}")).collect();
+        let sha256 = plica_training::hexadecimal(&Sha256::digest(&glb));
         Self { key: shared.keys.mesh(&shared.scene.object), glb, sha256 }
     }
 

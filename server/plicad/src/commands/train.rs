@@ -10,7 +10,7 @@ use anyhow::Context;
 use plica_jobs::by_hand::{self, JobRequest};
 use plica_scene::Config;
 use plica_scene::setup::setup;
-use plica_training::{Folder, Job, JobKind, Report, write_atomically};
+use plica_training::{DatabaseKind, TrainingFolder, TrainingJob, TrainingReport, default_threads, write_atomically};
 
 use crate::cli::{TrainArgs, TrainKind};
 
@@ -34,25 +34,19 @@ pub fn run(args: &TrainArgs, json: bool) -> anyhow::Result<()> {
     }
 }
 
-/// All cores but one: somebody may be simulating.
-fn default_threads() -> u32 {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    u32::try_from(cores.saturating_sub(1)).unwrap_or(1).max(1)
-}
-
 /// A job by hand: makes its folder, shows a bar, prints a table.
 fn run_scene(config: &Config, args: &TrainArgs, n_threads: u32, json: bool) -> anyhow::Result<()> {
     let ending = Ending::listen()?;
     let kind = match args.kind {
-        TrainKind::Training => JobKind::Training,
-        TrainKind::Evaluation => JobKind::Evaluation,
+        TrainKind::Training => DatabaseKind::Training,
+        TrainKind::Evaluation => DatabaseKind::Evaluation,
     };
     let root = args.folder.clone().unwrap_or_else(|| default_folder(config, kind));
     let request = JobRequest { kind, examples: args.examples, seed: args.seed, threads: n_threads };
     let (folder, job) = by_hand::make(&root, config, &request)?;
     let begun = by_hand::begin(&root).with_context(|| root.display().to_string())?;
     let watch = OnTerminal::new(Some(ending));
-    let result = work(config, &job, &folder, n_threads as usize, &watch);
+    let result = work(config, &job, &folder, n_threads as usize, &mut |p| watch.observe(&p));
     watch.finish();
     // The result counts, even if the note about it cannot be written.
     if let Err(error) = by_hand::end(&root, begun, &result) {
@@ -60,11 +54,12 @@ fn run_scene(config: &Config, args: &TrainArgs, n_threads: u32, json: bool) -> a
     }
     let report = result?;
     if let Some(out) = &args.out {
-        copy(&folder.database(), out)?;
+        copy(&folder.paths().database(), out)?;
     }
-    table::print(&report, args.out.as_deref().unwrap_or(&folder.database()), &folder.report());
+    let database = args.out.clone().unwrap_or_else(|| folder.paths().database());
+    table::print(&report, &database, &folder.paths().report());
     if json {
-        println!("{}", summary(&report, args.out.as_deref().unwrap_or(&folder.database()), &root)?);
+        println!("{}", summary(&report, &database, &root)?);
     }
     Ok(())
 }
@@ -73,15 +68,15 @@ fn run_scene(config: &Config, args: &TrainArgs, n_threads: u32, json: bool) -> a
 fn run_job(root: &Path, threads: Option<u32>, json: bool) -> anyhow::Result<()> {
     let ending = Ending::listen()?;
     anyhow::ensure!(root.is_dir(), "{}: is no job folder: there is no such folder", root.display());
-    let folder = Folder::open(root)?;
+    let folder = TrainingFolder::open(root)?;
     let job = folder.job()?;
-    let config = Config::from_file(&root.join("scene.toml"))?;
+    let config = Config::from_file(&folder.paths().scene())?;
     let n_threads = threads.or(job.threads).unwrap_or_else(default_threads);
-    let watch = ToLog::new(ending, job.kind.name());
-    let report = work(&config, &job, &folder, n_threads as usize, &watch)?;
+    let mut watch = ToLog::new(ending, job.kind.name());
+    let report = work(&config, &job, &folder, n_threads as usize, &mut |p| watch.observe(&p))?;
     watch.done(&report);
     if json {
-        println!("{}", summary(&report, &folder.database(), root)?);
+        println!("{}", summary(&report, &folder.paths().database(), root)?);
     }
     Ok(())
 }
@@ -89,16 +84,17 @@ fn run_job(root: &Path, threads: Option<u32>, json: bool) -> anyhow::Result<()> 
 /// The one code path of all.
 pub(super) fn work(
     config: &Config,
-    job: &Job,
-    folder: &Folder,
+    job: &TrainingJob,
+    folder: &TrainingFolder,
     n_threads: usize,
-    watch: &dyn plica_training::Watch,
-) -> anyhow::Result<Report> {
+    observer: plica_training::Observer<'_>,
+) -> anyhow::Result<TrainingReport> {
     let setup = setup(config)?;
-    Ok(plica_training::run(&setup, job, n_threads, folder, watch)?)
+    Ok(plica_training::run(&setup, job, n_threads, folder, observer)?)
 }
 
-fn default_folder(config: &Config, kind: JobKind) -> PathBuf {
+/// TrainingFolder of a job by hand, unless another one is named.
+pub(super) fn default_folder(config: &Config, kind: DatabaseKind) -> PathBuf {
     Path::new("out/train").join(format!("{}-{}", config.name(), kind.name()))
 }
 
@@ -111,7 +107,7 @@ fn copy(database: &Path, out: &Path) -> anyhow::Result<()> {
     write_atomically(out, &bytes).with_context(|| name(out))
 }
 
-fn summary(report: &Report, database: &Path, folder: &Path) -> Result<String, serde_json::Error> {
+fn summary(report: &TrainingReport, database: &Path, folder: &Path) -> Result<String, serde_json::Error> {
     let mut value = serde_json::to_value(report)?;
     value["database"] = database.display().to_string().into();
     value["folder"] = folder.display().to_string().into();

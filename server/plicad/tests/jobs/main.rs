@@ -94,7 +94,7 @@ fn a_program_that_is_not_there_fails_the_job_and_not_the_daemon() {
 
 #[test]
 fn a_folder_that_cannot_be_written_fails_the_job() {
-    for obstacle in ["state.json.new", "log.txt"] {
+    for obstacle in [".state.json.tmp", "log.txt"] {
         let workplace = Workplace::new("finish");
         workplace.replace_script("while [ ! -e $dir/go ]; do sleep 0.02; done; finish");
         let daemon = workplace.open();
@@ -193,7 +193,7 @@ fn a_folder_in_which_somebody_works_has_to_wait() {
     let workplace = Workplace::new("while [ ! -e $dir/go ]; do sleep 0.02; done; finish");
     let daemon = workplace.open();
     let [first, busy, last] = ["a", "b", "c"].map(|client_id| daemon.submit(client_id).id);
-    let held = plica_training::Folder::open(&workplace.path("jobs").join(&busy)).unwrap();
+    let held = plica_training::TrainingFolder::open(&workplace.path("jobs").join(&busy)).unwrap();
     for id in [&first, &busy, &last] {
         fs::write(workplace.in_job(id, "go"), "").unwrap();
     }

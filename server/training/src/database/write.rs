@@ -7,9 +7,9 @@ use safetensors::tensor::{Metadata as Header, TensorInfo};
 
 use super::tensors::{NO_CHECKSUM, Tensors, checksum, f32s, f64s};
 use super::{Database, DatabaseError, FORMAT, FORMAT_VERSION, METADATA_KEY, Metadata};
+use crate::atomic_file::write_atomically;
 use crate::canonical;
 use crate::example::Example;
-use crate::files::write_atomically;
 
 impl Database {
     /// Writes the file atomically. The same examples give the same bytes.

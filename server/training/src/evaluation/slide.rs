@@ -18,7 +18,7 @@ use crate::obstacle::obstacle;
 use crate::plan::plan;
 use crate::setup::{PressRanges, Setup, Source};
 use crate::tandem::Tandem;
-use crate::way::Way;
+use crate::tool_path::ToolPath;
 use plica_geometry::ReferenceSkin;
 
 /// From state to state \[m\].
@@ -167,14 +167,14 @@ fn poses(setup: &Setup) -> Result<(usize, Vec<Isometry3<f64>>), SlideError> {
     let presses = plan(setup, &[set], setup.evaluation_seed).map_err(TrainingError::from)?;
     let skin = ReferenceSkin::new(&setup.coarse.skin);
     let shape = obstacle(&setup.coarse.tools[tool].shape).map_err(|_| SlideError::TooShort)?;
-    let ways: Vec<Way> = presses.iter().filter_map(|press| Way::of(press, &shape, &skin)).collect();
-    let apart = |(a, b): &(&Way, &Way)| (a.end().translation.vector - b.end().translation.vector).norm();
+    let ways: Vec<ToolPath> = presses.iter().filter_map(|press| ToolPath::of(press, &shape, &skin)).collect();
+    let apart = |(a, b): &(&ToolPath, &ToolPath)| (a.end().translation.vector - b.end().translation.vector).norm();
     let pairs = ways.iter().flat_map(|a| ways.iter().map(move |b| (a, b)));
     let farthest = pairs.max_by(|a, b| apart(a).total_cmp(&apart(b)));
     let (first, last) = farthest.ok_or(SlideError::TooShort)?;
     let back = last.poses().iter().rev();
     let corners = first.poses().iter().chain(back).copied().collect();
-    Ok((tool, Way::new(corners).steps(STEP_M)))
+    Ok((tool, ToolPath::new(corners).steps(STEP_M)))
 }
 
 /// `None` without three neighbours.

@@ -6,7 +6,7 @@ use std::time::Instant;
 use plica_jobs::by_hand::{JobRequest, make};
 use plica_scene::Config;
 use plica_scene::hash::scene_hash;
-use plica_training::{Database, JobKind};
+use plica_training::{Database, DatabaseKind, JobPaths};
 
 use crate::commands::train::{OnTerminal, work};
 use crate::demo::Trained;
@@ -16,20 +16,24 @@ pub(super) fn examples(config: &Config, out: &Path, n: u32) -> anyhow::Result<Tr
     let begin = Instant::now();
     let hash = scene_hash(config)?;
     let root = folder(out, &hash, n);
-    let kept = root.join("database.safetensors");
+    let kept = JobPaths::new(root.clone()).database();
     if let Ok(database) = Database::read(&kept, Some(&hash)) {
         return Ok(Trained { examples: database.examples.len(), seconds: 0.0, database: kept });
     }
     let n_threads = std::thread::available_parallelism().map_or(1, usize::from);
     let request =
-        JobRequest { kind: JobKind::Training, examples: Some(n), seed: None, threads: u32::try_from(n_threads)? };
+        JobRequest { kind: DatabaseKind::Training, examples: Some(n), seed: None, threads: u32::try_from(n_threads)? };
     let (folder, job) = make(&root, config, &request)?;
     eprintln!("trains {n} examples in {}, once", root.display());
     let watch = OnTerminal::new(None);
-    let report = work(config, &job, &folder, n_threads, &watch);
+    let report = work(config, &job, &folder, n_threads, &mut |p| watch.observe(&p));
     watch.finish();
     let examples = report?.result.examples;
-    Ok(Trained { examples: examples as usize, seconds: begin.elapsed().as_secs_f64(), database: folder.database() })
+    Ok(Trained {
+        examples: examples as usize,
+        seconds: begin.elapsed().as_secs_f64(),
+        database: folder.paths().database(),
+    })
 }
 
 /// Another scene, or another number, is another folder: nothing in it is ever out of date.

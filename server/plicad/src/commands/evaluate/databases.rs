@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use plica_scene::Config;
-use plica_training::{Database, JobKind, Setup};
+use plica_training::{Database, DatabaseKind, JobPaths, Setup};
 
 use crate::cli::DatabaseArgs;
+use crate::commands::train::default_folder;
 
 /// Examples to learn from, and those to judge by.
 ///
@@ -35,18 +36,18 @@ pub(in crate::commands) fn read(
         );
         Ok(database)
     };
-    Ok((read(&args.training, JobKind::Training)?, read(&args.held_out, JobKind::Evaluation)?))
+    Ok((read(&args.training, DatabaseKind::Training)?, read(&args.held_out, DatabaseKind::Evaluation)?))
 }
 
-fn default_path(config: &Config, kind: JobKind) -> PathBuf {
-    Path::new("out/train").join(format!("{}-{}", config.name(), kind.name())).join("database.safetensors")
+fn default_path(config: &Config, kind: DatabaseKind) -> PathBuf {
+    JobPaths::new(default_folder(config, kind)).database()
 }
 
 /// What makes the file that is missing.
-fn command(config: &Config, kind: JobKind, path: &Path, given: &Option<PathBuf>) -> String {
+fn command(config: &Config, kind: DatabaseKind, path: &Path, given: &Option<PathBuf>) -> String {
     let file = config.file();
     let scene = if file.exists() { file.display().to_string() } else { config.name().to_owned() };
-    let kind = if kind == JobKind::Training { "" } else { " --kind evaluation" };
+    let kind = if kind == DatabaseKind::Training { "" } else { " --kind evaluation" };
     let out = given.as_ref().map_or(String::new(), |_| format!(" --out {}", path.display()));
     format!("plicad train {scene}{kind}{out}")
 }

@@ -1,8 +1,8 @@
-//! `plicad train --sensitivity`: how firm the accurate skin is.
+//! `plicad train --sensitivity`: sensitivity of the accurate skin to mesh, tie and reference.
 
 use plica_scene::Config;
 use plica_scene::{model, setup};
-use plica_training::{Difference, Progress, Sensitivity, Variations, Watch, sensitivity};
+use plica_training::{Difference, Sensitivity, Variations, sensitivity};
 
 use super::watch::Ending;
 
@@ -11,18 +11,8 @@ const REFINEMENTS: [f64; 3] = [0.75, 1.0, 1.5];
 /// Factors on the stiffness of the tie.
 const TIE_FACTORS: [f64; 4] = [0.1, 1.0, 10.0, 100.0];
 
-/// Stops at SIGTERM.
-struct Quiet(Ending);
-
-impl Watch for Quiet {
-    fn progress(&self, _: &Progress) {}
-    fn cancelled(&self) -> bool {
-        self.0.is_asked()
-    }
-}
-
 pub(super) fn run(config: &Config, n_interactions: usize, n_threads: usize, json: bool) -> anyhow::Result<()> {
-    let watch = Quiet(Ending::listen()?);
+    let ending = Ending::listen()?;
     let setup = setup::setup(config)?;
     let own = config.object().accurate().divisions;
     let mut meshes = Vec::new();
@@ -33,8 +23,15 @@ pub(super) fn run(config: &Config, n_interactions: usize, n_threads: usize, json
     }
     let variations =
         Variations { n_interactions, meshes, tie_factors: TIE_FACTORS.to_vec(), independent_on_all_meshes: true };
-    let said = |what: &str| tracing::info!("solves {n_interactions} interactions: {what}");
-    let found = sensitivity(&setup, &variations, n_threads, &watch, &said)?;
+    let mut newest = String::new();
+    let mut observer = |variant: &str| {
+        if newest != variant {
+            tracing::info!("solves {n_interactions} interactions: {variant}");
+            variant.clone_into(&mut newest);
+        }
+        ending.flow()
+    };
+    let found = sensitivity(&setup, &variations, n_threads, &mut observer)?;
     print(&found);
     if json {
         println!("{}", serde_json::to_string(&found)?);

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use plica_training::{Report, Solves, Spread};
+use plica_training::{Solves, Spread, TrainingReport};
 
-pub(super) fn print(report: &Report, database: &Path, file: &Path) {
+pub(super) fn print(report: &TrainingReport, database: &Path, file: &Path) {
     let (result, run) = (&report.result, &report.run);
     let kinds: Vec<_> = result.kinds.iter().map(|(kind, n)| format!("{n} {kind}")).collect();
     println!("{}", database.display());

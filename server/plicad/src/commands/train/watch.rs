@@ -1,12 +1,12 @@
-//! Who hears how a job goes: a bar on the terminal, or lines of a log. Both stop it at SIGTERM and Ctrl-C.
+//! Observers of a job: a bar on the terminal, or lines of a log. Both stop it at SIGTERM and Ctrl-C.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
-use plica_training::{Progress, Report, Stage, Watch};
+use plica_training::{TrainingProgress, TrainingReport, TrainingStage};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 /// At least this long between two lines of a log.
@@ -25,8 +25,9 @@ impl Ending {
         Ok(Self(asked))
     }
 
-    pub(super) fn is_asked(&self) -> bool {
-        self.0.load(Relaxed)
+    /// `Break` once the process is asked to end.
+    pub(super) fn flow(&self) -> ControlFlow<()> {
+        if self.0.load(Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
 
@@ -49,17 +50,12 @@ impl OnTerminal {
     pub(in crate::commands) fn finish(&self) {
         self.bar.finish_and_clear();
     }
-}
 
-impl Watch for OnTerminal {
-    fn progress(&self, p: &Progress) {
+    pub(in crate::commands) fn observe(&self, p: &TrainingProgress) -> ControlFlow<()> {
         self.bar.set_length(p.total.into());
         self.bar.set_position((p.done + p.rejected).into());
         self.bar.set_message(line(p));
-    }
-
-    fn cancelled(&self) -> bool {
-        self.ending.as_ref().is_some_and(Ending::is_asked)
+        self.ending.as_ref().map_or(ControlFlow::Continue(()), Ending::flow)
     }
 }
 
@@ -68,43 +64,42 @@ impl Watch for OnTerminal {
 pub(super) struct ToLog {
     ending: Ending,
     kind: &'static str,
-    last: Mutex<Option<(Instant, Stage, u32)>>,
+    newest: Option<TrainingProgress>,
+    /// Time and content of the last line.
+    last: Option<(Instant, TrainingProgress)>,
 }
 
 impl ToLog {
     pub(super) fn new(ending: Ending, kind: &'static str) -> Self {
-        Self { ending, kind, last: Mutex::new(None) }
+        Self { ending, kind, newest: None, last: None }
     }
 
-    pub(super) fn done(&self, report: &Report) {
+    pub(super) fn done(&self, report: &TrainingReport) {
         let (examples, rejected) = (report.result.examples, report.result.rejected.len());
         eprintln!("{}: {examples} examples, {rejected} rejected, in {:.0} s", self.kind, report.run.wall_s);
     }
-}
 
-impl Watch for ToLog {
-    fn progress(&self, p: &Progress) {
-        let mut last = self.last.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let is_news = last.is_none_or(|(at, stage, rejected)| {
-            at.elapsed() >= LOG_INTERVAL || stage != p.stage || rejected != p.rejected
-        });
-        if is_news {
+    pub(super) fn observe(&mut self, p: &TrainingProgress) -> ControlFlow<()> {
+        if self.newest.replace(*p) != Some(*p) && self.is_news(p) {
             eprintln!("{}: {} of {}, {}", self.kind, p.done + p.rejected, p.total, line(p));
-            *last = Some((Instant::now(), p.stage, p.rejected));
+            self.last = Some((Instant::now(), *p));
         }
+        self.ending.flow()
     }
 
-    fn cancelled(&self) -> bool {
-        self.ending.is_asked()
+    fn is_news(&self, p: &TrainingProgress) -> bool {
+        self.last.is_none_or(|(at, last)| {
+            at.elapsed() >= LOG_INTERVAL || last.stage != p.stage || last.rejected != p.rejected
+        })
     }
 }
 
-fn line(p: &Progress) -> String {
+fn line(p: &TrainingProgress) -> String {
     match (p.stage, p.seconds_left) {
-        (Stage::Interactions, _) => "draws interactions".to_owned(),
-        (Stage::Database, _) => "writes the database".to_owned(),
-        (Stage::Examples, None) => format!("{} rejected", p.rejected),
-        (Stage::Examples, Some(seconds)) => {
+        (TrainingStage::Interactions, _) => "draws interactions".to_owned(),
+        (TrainingStage::Database, _) => "writes the database".to_owned(),
+        (TrainingStage::Examples, None) => format!("{} rejected", p.rejected),
+        (TrainingStage::Examples, Some(seconds)) => {
             let left = HumanDuration(Duration::from_secs_f64(seconds.clamp(0.0, 1e9)));
             format!("{} rejected, {left} left", p.rejected)
         }

@@ -5,7 +5,7 @@ use plica_accurate::contact::Obstacle;
 use plica_accurate::{TieOptions, TieTarget};
 use plica_geometry::VertexIdx;
 
-use crate::lift::Disc;
+use crate::suction::Disc;
 use plica_geometry::ReferenceSkin;
 
 /// Vertices nearer to the tool than the band, on the deformed coarse skin; `offsets: [n_skin]` \[m\].

@@ -1,4 +1,4 @@
-//! The way of a tool to its place: straight lines between poses.
+//! Path of a tool: straight lines between poses.
 
 use nalgebra::Isometry3;
 use plica_accurate::contact::Obstacle;
@@ -15,19 +15,19 @@ const CLEARANCE_M: f64 = 1e-3;
 
 /// Poses that a tool visits in straight lines, `world <- tool`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Way {
+pub struct ToolPath {
     poses: Vec<Isometry3<f64>>,
     /// Path from the first pose to each \[m\].
     reached: Vec<f64>,
 }
 
-impl Way {
+impl ToolPath {
     /// From one pose or more.
     ///
     /// # Panics
     /// Without a pose.
     pub fn new(poses: Vec<Isometry3<f64>>) -> Self {
-        assert!(!poses.is_empty(), "a way has a pose");
+        assert!(!poses.is_empty(), "a tool path has a pose");
         let mut reached = vec![0.0];
         for (k, pair) in poses.windows(2).enumerate() {
             let turn = LEVER_M * pair[0].rotation.angle_to(&pair[1].rotation);
@@ -36,7 +36,7 @@ impl Way {
         Self { poses, reached }
     }
 
-    /// The way of `interaction`: from a little above first touch in by the depth, then aside by the drag; or as recorded.
+    /// Path of `interaction`: from a clearance above first touch in by the depth, then along the drag; or as recorded.
     /// `None` for a lift, and for a press that touches nothing.
     pub fn of(interaction: &Interaction, obstacle: &Obstacle, skin: &ReferenceSkin) -> Option<Self> {
         match &interaction.action {
@@ -76,17 +76,17 @@ impl Way {
 
     /// The pose at a share of the length, 0 to 1.
     pub fn at(&self, share: f64) -> Isometry3<f64> {
-        let path = share * self.length_m();
-        let next = self.reached.partition_point(|r| *r < path);
+        let travelled = share * self.length_m();
+        let next = self.reached.partition_point(|r| *r < travelled);
         if next == 0 || next >= self.poses.len() {
             return self.poses[next.min(self.poses.len() - 1)];
         }
-        let within = (path - self.reached[next - 1]) / (self.reached[next] - self.reached[next - 1]);
+        let within = (travelled - self.reached[next - 1]) / (self.reached[next] - self.reached[next - 1]);
         let (a, b) = (&self.poses[next - 1], &self.poses[next]);
         a.try_lerp_slerp(b, within, 1e-12).unwrap_or(*b)
     }
 
-    /// Poses no farther apart than `step_m`, every corner of the way among them.
+    /// Poses no farther apart than `step_m`, every waypoint among them.
     pub fn steps(&self, step_m: f64) -> Vec<Isometry3<f64>> {
         let mut steps = vec![self.poses[0]];
         for (k, pair) in self.poses.windows(2).enumerate() {
@@ -111,21 +111,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_way_is_walked_at_even_pace_and_rests_at_its_corners() {
+    fn a_tool_path_is_followed_at_even_pace_through_its_waypoints() {
         let at = |x: f64, z: f64| Isometry3::translation(x, 0.0, z);
-        let way = Way::new(vec![at(0.0, 3.0), at(0.0, 0.0), at(1.0, 0.0)]);
-        assert_eq!(way.length_m(), 4.0);
-        assert!((way.at(0.25).translation.vector.z - 2.0).abs() < 1e-12);
-        assert!((way.at(0.875).translation.vector.x - 0.5).abs() < 1e-12);
-        assert_eq!((way.at(0.0), way.at(1.0)), (at(0.0, 3.0), at(1.0, 0.0)));
-        let steps = way.steps(2.0);
+        let path = ToolPath::new(vec![at(0.0, 3.0), at(0.0, 0.0), at(1.0, 0.0)]);
+        assert_eq!(path.length_m(), 4.0);
+        assert!((path.at(0.25).translation.vector.z - 2.0).abs() < 1e-12);
+        assert!((path.at(0.875).translation.vector.x - 0.5).abs() < 1e-12);
+        assert_eq!((path.at(0.0), path.at(1.0)), (at(0.0, 3.0), at(1.0, 0.0)));
+        let steps = path.steps(2.0);
         assert_eq!(steps.len(), 4);
         assert!(steps.contains(&at(0.0, 0.0)) && steps.contains(&at(0.0, 1.5)));
     }
 
     #[test]
-    fn a_single_pose_is_a_way_too() {
-        let way = Way::new(vec![Isometry3::identity()]);
-        assert_eq!((way.length_m(), way.at(0.5)), (0.0, Isometry3::identity()));
+    fn a_single_pose_is_a_tool_path() {
+        let path = ToolPath::new(vec![Isometry3::identity()]);
+        assert_eq!((path.length_m(), path.at(0.5)), (0.0, Isometry3::identity()));
     }
 }
