@@ -63,7 +63,7 @@ pub const ALLOWED: [(&str, &[&str]); 13] = [
 ];
 
 /// Arrows for tests alone: the bus is tested with the clients that use it.
-const ALLOWED_IN_TESTS: [(&str, &str); 1] = [("plica-daemon", "plica-client")];
+const ALLOWED_IN_TESTS: [(&str, &str); 2] = [("plica-daemon", "plica-client"), ("plica-trajectory", "plica-protocol")];
 
 /// Libraries that a crate beyond the pure ones never names: scenes are read without bus, command line and async runtime.
 pub const UNNAMED: [(&str, &[&str]); 1] = [("plica-scene", &["clap", "tokio", "zenoh"])];

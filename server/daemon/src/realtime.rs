@@ -24,11 +24,11 @@ pub use frame::{Frame, Reading, ToolFrame};
 pub use histogram::{AtomicHistogram, Summary};
 pub use pacing::{MAX_CATCH_UP, Pacer, Plan};
 pub use ports::{CommandPort, FramePort, Ports, WrenchPort};
-pub use privileges::Grants;
+pub use privileges::{Grants, ThreadOptions};
 pub use sim_loop::{Loop, LoopOptions, MAX_STEP_POSES, Turn};
 pub use stage_timer::{StageTimer, TurnProbe};
 pub use statistics::Statistics;
-pub use thread::{Pace, Running, ThreadOptions, spawn};
+pub use thread::{Pace, Running, spawn};
 pub use waker::Waker;
 
 #[cfg(test)]

@@ -181,7 +181,7 @@ mod tests {
             ("seed = 1\n", "seed = 11\n"),
             ("max_contacts = 32", "max_contacts = 64"),
             ("full_press_s = 0.5", "full_press_s = 0.4"),
-            ("method = \"kriging\"", "method = \"ridge\""),
+            ("method = \"kriging-stamp\"", "method = \"ridge-vector\""),
             ("# radius_cells = 7.0", "radius_cells = 5.0"),
         ];
         for (from, to) in changes {

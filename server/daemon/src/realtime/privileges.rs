@@ -1,6 +1,15 @@
 //! What the operating system grants to the simulation thread, and what is done without.
 
-use super::thread::ThreadOptions;
+/// How the thread is set up.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ThreadOptions {
+    /// `SCHED_FIFO` priority to ask for.
+    pub priority: Option<u32>,
+    /// Core to pin to.
+    pub cpu: Option<usize>,
+    /// Whether to lock memory.
+    pub lock_memory: bool,
+}
 
 /// What was granted. Every refusal has a sentence in `warnings` that says what it means and what to do.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -7,8 +7,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::pacing::{Pacer, Plan};
-use super::privileges::Grants;
-use super::privileges::acquire;
+use super::privileges::{Grants, ThreadOptions, acquire};
 use super::sim_loop::{Loop, Turn};
 use super::stage_timer::StageTimer;
 use super::statistics::Statistics;
@@ -19,17 +18,6 @@ use super::waker::Waker;
 const SPIN: Duration = Duration::from_micros(100);
 /// How long a thread in lock-step sleeps when nobody wakes it.
 const LOCK_STEP_NAP: Duration = Duration::from_millis(100);
-
-/// How the thread is set up.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct ThreadOptions {
-    /// `SCHED_FIFO` priority to ask for.
-    pub priority: Option<u32>,
-    /// Core to pin to.
-    pub cpu: Option<usize>,
-    /// Whether to lock memory.
-    pub lock_memory: bool,
-}
 
 /// When ticks happen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
