@@ -39,7 +39,7 @@ pub(super) struct Start {
     pub(super) has_potential: bool,
 }
 
-/// Verdict on a step by energy differences.
+/// decision on a step by energy differences.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Judgement {
     Accept,
