@@ -8,9 +8,13 @@ pub mod citations;
 pub mod sources;
 pub mod words;
 
-/// Root of the repository.
+/// Root of the repository whose tests run.
+///
+/// Cargo's variable is read when the test runs: a test built in another clone that shares the build folder would
+/// otherwise look at that clone.
 pub fn repository() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().expect("the crate lies in the repository")
+    let here = std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo runs the tests");
+    Path::new(&here).join("..").canonicalize().expect("the crate lies in the repository")
 }
 
 /// A program of this project, built in the same profile as the tests.
