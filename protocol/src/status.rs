@@ -128,6 +128,8 @@ pub struct ObjectStatus {
     pub frames_published: u64,
     /// Deepest penetration since reset in metres.
     pub max_penetration_m: f64,
+    /// Contacts found and left out since reset, a tick at a time, because a tool or plane had its `max_contacts`.
+    pub dropped_contacts: u64,
     /// The implicit solve.
     pub solver: SolverStatus,
 }

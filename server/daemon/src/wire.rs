@@ -112,6 +112,7 @@ pub fn object_status(reading: &Reading) -> ObjectStatus {
         enriched: reading.confidence.is_some(),
         confidence: reading.confidence.map(f64::from),
         max_penetration_m: reading.max_penetration_m.into(),
+        dropped_contacts: reading.dropped_contacts,
         solver: SolverStatus { iterations: reading.report.iterations.into(), fallbacks: reading.fallbacks },
         ..ObjectStatus::default()
     }

@@ -11,6 +11,7 @@ mod description;
 mod element;
 mod embedding;
 pub mod enrichment;
+pub mod kernels;
 mod lanes;
 mod model;
 mod probe;

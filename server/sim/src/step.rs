@@ -75,7 +75,7 @@ pub(crate) fn placement(pose: &Isometry3<f64>) -> Placement {
     Placement { rotation: pose.rotation.to_rotation_matrix().matrix().cast(), origin: pose.translation.vector.cast() }
 }
 
-fn rotate_elements(model: &Model, state: &mut State, workspace: &mut Workspace) {
+pub(crate) fn rotate_elements(model: &Model, state: &mut State, workspace: &mut Workspace) {
     model.elements.update_rotations(&state.u, &mut state.quaternions, &mut workspace.rotations);
     if model.tridiagonal.is_some() {
         set_zero(&mut workspace.node_quaternions);
@@ -85,7 +85,7 @@ fn rotate_elements(model: &Model, state: &mut State, workspace: &mut Workspace) 
 }
 
 /// `r = h f(x + h v) + h M (g - alpha v) + h f_external`
-fn load_residual(model: &Model, state: &State, workspace: &mut Workspace) {
+pub(crate) fn load_residual(model: &Model, state: &State, workspace: &mut Workspace) {
     let (h, d) = (model.dt, &model.description);
     let gravity: V3 = d.gravity_m_per_s2.cast();
     let alpha = d.mass_damping_per_s as f32;
@@ -136,7 +136,7 @@ fn finish_tools(model: &Model, index: u32, state: &mut State, workspace: &mut Wo
 }
 
 /// Rows of all bodies, with multipliers from the last tick.
-fn find_contacts(model: &Model, state: &State, workspace: &mut Workspace, report: &mut TickReport) {
+pub(crate) fn find_contacts(model: &Model, state: &State, workspace: &mut Workspace, report: &mut TickReport) {
     let options = &model.description.contact;
     let n_tools = model.n_tools();
     let skin_motion = state.max_speed() * model.dt;
@@ -203,7 +203,12 @@ fn predict_rows(model: &Model, rows: &mut Rows, motions: &[ProxyMotion]) {
 }
 
 /// Solves, adapts the rows, and solves again until every row pushes and every friction state holds.
-fn solve_with_contact(model: &Model, workspace: &mut Workspace, probe: &mut impl Probe, report: &mut TickReport) {
+pub(crate) fn solve_with_contact(
+    model: &Model,
+    workspace: &mut Workspace,
+    probe: &mut impl Probe,
+    report: &mut TickReport,
+) {
     let multipliers: f32 = workspace.rows.rows.iter().map(|r| r.contact.normal_force).sum();
     let mut stop = None;
     for pass in 0..MAX_PASSES {

@@ -57,6 +57,8 @@ pub struct Reading {
     pub max_penetration_m: f32,
     /// Ticks since reset that repeated a solve with block Jacobi.
     pub fallbacks: u64,
+    /// Contact rows since reset that were found and left out because a tool or plane had its `max_contacts`.
+    pub dropped_contacts: u64,
     /// Least confidence over the tools that touch; `None` while no examples are active.
     pub confidence: Option<f32>,
     /// All tools, `[n_tools]`.

@@ -33,6 +33,7 @@ pub(super) struct Outbox {
     pub(super) was_sleeping: bool,
     pub(super) max_penetration_m: f32,
     pub(super) fallbacks: u64,
+    pub(super) dropped_contacts: u64,
 }
 
 /// One tool's wrenches.
@@ -93,6 +94,7 @@ impl Outbox {
     pub(super) fn forget(&mut self) {
         self.max_penetration_m = 0.0;
         self.fallbacks = 0;
+        self.dropped_contacts = 0;
         self.degraded = false;
     }
 
@@ -100,6 +102,7 @@ impl Outbox {
         self.degraded |= report.rolled_back;
         self.max_penetration_m = self.max_penetration_m.max(report.max_penetration_m);
         self.fallbacks += u64::from(report.fallbacks > 0);
+        self.dropped_contacts += u64::from(report.dropped_contacts);
     }
 
     fn hand_out_wrenches(&mut self, state: &State, detail: &Detail, statistics: &Statistics) {
@@ -171,6 +174,7 @@ impl Outbox {
         reading.report = *report;
         reading.max_penetration_m = self.max_penetration_m;
         reading.fallbacks = self.fallbacks;
+        reading.dropped_contacts = self.dropped_contacts;
         reading.confidence = detail.least_confidence();
         reading.tools.copy_from_slice(state.tools());
         self.readings.publish();

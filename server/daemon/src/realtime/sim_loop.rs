@@ -341,6 +341,7 @@ fn connect_outbox(
         was_sleeping: false,
         max_penetration_m: 0.0,
         fallbacks: 0,
+        dropped_contacts: 0,
     };
     (outbox, frame_port, wrench_ports, readings_out)
 }

@@ -25,7 +25,11 @@ coupling = "rigid"
 "#;
 
 fn start(lock_step: bool) -> (Loop, Ports) {
-    let config = Config::parse(Path::new("block.toml"), SCENE).unwrap();
+    serve(SCENE, lock_step)
+}
+
+fn serve(scene: &str, lock_step: bool) -> (Loop, Ports) {
+    let config = Config::parse(Path::new("block.toml"), scene).unwrap();
     let model = Arc::new(model::build(&config).unwrap());
     Loop::new(model, LoopOptions { publish_hz: 90.0, wrench_hz: 500.0, lock_step })
 }
@@ -118,6 +122,25 @@ fn a_publisher_that_never_reads_delays_nothing_and_is_counted() {
     }
     assert_eq!(core.state().tick(), 1000);
     assert_eq!(ports.statistics.wrench_drops.load(Relaxed), 500 - 256);
+}
+
+#[test]
+fn contacts_left_out_are_summed_until_a_reset() {
+    // Cells of 5 mm, so that several rows fit below the ball.
+    let scene = SCENE.replace("divisions = [2, 2, 2]", "divisions = [8, 8, 4]");
+    let (mut core, mut ports) = serve(&format!("{scene}[contact]\nmax_contacts = 1\n"), false);
+    let mut dropped = 0;
+    for k in 0..100_u32 {
+        ports.poses[0].push(sample(1 + u64::from(k), 0.026 - 4e-5 * f64::from(k))).unwrap();
+        if let Turn::Ticked(report) = core.turn(&mut NoProbe) {
+            dropped += u64::from(report.dropped_contacts);
+        }
+    }
+    let reading = ports.readings.read();
+    assert!(dropped > 0, "a ball 4 mm deep touches more than one point");
+    assert_eq!(crate::wire::object_status(reading).dropped_contacts, dropped);
+    order(&mut core, &mut ports, Command::Reset).unwrap();
+    assert_eq!(ports.readings.read().dropped_contacts, 0);
 }
 
 #[test]

@@ -61,13 +61,13 @@ fn simulate(config: &Config, poses: Vec<TimedPose>, args: &SimulateArgs) -> anyh
         replay.enrich(enrichment.live(ready));
     }
     let progress = bar(n_ticks)?;
-    let (mut ticks_in_contact, mut peak_force_n) = (0, 0.0_f64);
+    let (mut ticks_in_contact, mut peak_force_n, mut dropped_contacts) = (0, 0.0_f64, 0_u64);
     for tick in 1..=n_ticks {
         let wanted = tick % args.every == 0;
         if wanted {
             replay.want_frame();
         }
-        replay.tick(&mut NoProbe);
+        dropped_contacts += u64::from(replay.tick(&mut NoProbe).dropped_contacts);
         let tools = replay.core().state().tools();
         ticks_in_contact += u64::from(tools.iter().any(|t| t.in_contact));
         peak_force_n = tools.iter().map(|t| t.force_n.norm()).fold(peak_force_n, f64::max);
@@ -82,7 +82,7 @@ fn simulate(config: &Config, poses: Vec<TimedPose>, args: &SimulateArgs) -> anyh
     Ok(serde_json::json!({
         "scene": config.name(), "out": args.out, "n_ticks": n_ticks, "n_frames": n_frames,
         "n_skin": shape.n_skin, "n_tools": shape.n_tools, "rollbacks": replay.core().state().rollbacks(),
-        "ticks_in_contact": ticks_in_contact, "peak_force_n": peak_force_n,
+        "ticks_in_contact": ticks_in_contact, "peak_force_n": peak_force_n, "dropped_contacts": dropped_contacts,
     }))
 }
 

@@ -36,10 +36,11 @@ fn table(status: &Status) -> String {
     for (name, object) in &status.objects {
         let state = if object.sleeping { "sleeping" } else { "awake" };
         lines.push(format!(
-            "object {name}: {} vertices, {state}, {} frames, worst penetration {:.4} mm",
+            "object {name}: {} vertices, {state}, {} frames, worst penetration {:.4} mm, {} contacts left out",
             object.n_vertices,
             object.frames_published,
-            1e3 * object.max_penetration_m
+            1e3 * object.max_penetration_m,
+            object.dropped_contacts
         ));
     }
     for (name, tool) in &status.tools {
