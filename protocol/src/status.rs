@@ -18,6 +18,8 @@ pub const QUEUE_FULL: &str = "queue_full";
 pub const REPLY_DROPPED: &str = "reply_dropped";
 /// Counter of the daemon: a skin frame was not published, because it was not finite.
 pub const FRAME_REFUSED: &str = "frame_refused";
+/// Counter of the daemon: another daemon answered for the same session.
+pub const OTHER_DAEMON: &str = "other_daemon";
 
 /// What the daemon says about itself.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]

@@ -50,13 +50,13 @@ class Daemon:
             command = [plicad, "serve", scene, "--listen", self.endpoint, "--data", str(self.data), *options]
             self.process = subprocess.Popen(command, stdout=out, stderr=subprocess.STDOUT)
 
-    def wait(self):
-        wait_until(self.answers, f"{self.endpoint} to answer", 60)
+    def wait(self, session="main"):
+        wait_until(lambda: self.answers(session), f"{self.endpoint} to answer", 60)
 
-    def answers(self):
+    def answers(self, session="main"):
         assert self.process.poll() is None, f"plicad ended:\n{self.log.read_text()}"
         try:
-            with Client(self.endpoint) as client:
+            with Client(self.endpoint, session) as client:
                 return client.samples("status")
         except zenoh.ZError:
             return False

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -87,3 +88,19 @@ def test_a_second_daemon_on_another_port_is_another_one(daemon, plicad, scene, t
     finally:
         if other.process.poll() is None:
             other.process.kill()
+
+
+def test_a_service_manager_is_told_of_start_life_and_stop(plicad, scene, tmp_path, monkeypatch):
+    told = []
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(str(tmp_path / "notify"))
+        manager.settimeout(30)
+        monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "notify"))
+        monkeypatch.setenv("WATCHDOG_USEC", "400000")
+        running = Daemon(plicad, scene, tmp_path / "plicad.log")
+        while told.count("WATCHDOG=1") < 3:
+            told += manager.recv(4096).decode().splitlines()
+        assert told[0] == "READY=1", told
+        running.stop()
+        while "STOPPING=1" not in told:
+            told += manager.recv(4096).decode().splitlines()

@@ -7,6 +7,7 @@ mod activate;
 mod counters;
 mod error;
 mod guard;
+mod hearing;
 mod intake;
 mod jobs;
 mod mesh;
@@ -34,11 +35,15 @@ use plica_sim::Model;
 use zenoh::{Session, Wait};
 
 use crate::database_loader::Enrichment;
-use crate::realtime::{Grants, Ports};
+use crate::realtime::{Grants, Ports, Statistics};
 
 use counters::SharedCounters;
 pub use error::BusError;
+pub use hearing::Deaf;
+use hearing::{Hearing, Judge};
 use intake::PoseIntake;
+use port_owner::peers_of_port;
+pub use port_owner::{Peer, Process};
 pub use scene_info::SceneInfo;
 pub use session::{BusOptions, DEFAULT_ZENOH_CONFIG};
 use shared::Shared;
@@ -50,6 +55,8 @@ const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
 pub struct Parts {
     /// From [`Bus::open`].
     pub session: Session,
+    /// TCP ports that the session listens on.
+    pub ports_of_bus: Vec<u16>,
     /// Keys of the session.
     pub keys: Keys,
     /// What there is to publish.
@@ -69,6 +76,10 @@ pub struct Parts {
 /// An open bus with all its publishers, subscribers and answering threads.
 pub struct Bus {
     session: Session,
+    ports: Vec<u16>,
+    statistics: Arc<Statistics>,
+    hearing: Arc<Hearing>,
+    judge: Judge,
     stop: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
     wake: Vec<Thread>,
@@ -89,9 +100,24 @@ impl Bus {
         session::open(options)
     }
 
+    /// TCP ports that a session with these options listens on.
+    pub fn ports(options: &BusOptions) -> Vec<u16> {
+        session::ports(options)
+    }
+
+    /// Far ends of the connections to this session's ports.
+    pub fn peers(&self) -> Vec<Peer> {
+        self.ports.iter().flat_map(|port| peers_of_port(*port)).collect()
+    }
+
+    /// Turns of the simulation so far.
+    pub fn turns(&self) -> u64 {
+        self.statistics.turns.load(Relaxed)
+    }
+
     /// Declares every key and starts the threads.
     pub fn start(parts: Parts) -> Result<Self, BusError> {
-        let Parts { session, keys, scene, model, enrichment, ports, grants, jobs } = parts;
+        let Parts { session, ports_of_bus, keys, scene, model, enrichment, ports, grants, jobs } = parts;
         let Ports { poses, commands, frames, wrenches, readings, statistics } = ports;
         let counters = Arc::new(SharedCounters::default());
         let intake = Arc::new(PoseIntake::new(&scene, poses));
@@ -112,24 +138,54 @@ impl Bus {
         let published = Arc::new(skin::Published::default());
         let (skin_queries, skin_thread) = skin::start(&shared, frames, Arc::clone(&published), replies.clone())?;
         let wrench_thread = wrench::start(&shared, wrenches)?;
-        let sources = status::Sources { readings, statistics, grants, published };
+        let sources = status::Sources { readings, statistics: Arc::clone(&statistics), grants, published };
         let (status_queries, status_thread) = status::start(&shared, sources, replies.clone())?;
         let (job_requests, job_thread) = jobs::start(&shared, replies.clone())?;
         let (rpc_queries, rpc_threads) = rpc::start(&shared, commands, replies.clone(), job_requests)?;
+        let (hearing, hearing_thread) = hearing::start(&shared)?;
         let mesh_queries = mesh::declare(&shared, replies)?;
         let declared = Declared {
             _poses: poses::declare(&shared)?,
             _queryables: vec![skin_queries, status_queries, rpc_queries, mesh_queries],
             _alive: alive(&shared)?,
         };
-        let mut threads = vec![reply_thread, skin_thread, wrench_thread, status_thread, job_thread];
+        let mut threads = vec![reply_thread, skin_thread, wrench_thread, status_thread, job_thread, hearing_thread];
         threads.extend(rpc_threads);
         let wake = threads.iter().map(|t| t.thread().clone()).collect();
-        Ok(Self { session, stop, threads, wake, _declared: declared })
+        Ok(Self {
+            session,
+            ports: ports_of_bus,
+            statistics,
+            hearing,
+            judge: Judge::default(),
+            stop,
+            threads,
+            wake,
+            _declared: declared,
+        })
+    }
+
+    /// Judges whether the bus still answers; call it several times a second.
+    ///
+    /// # Errors
+    /// No own query was answered for almost two seconds while the simulation ran. The bus will not recover: leave it with
+    /// [`Bus::abandon`].
+    pub fn listen(&mut self) -> Result<(), Deaf> {
+        let turns = self.statistics.turns.load(Relaxed);
+        self.judge.look(self.hearing.now_ms(), self.hearing.answered_ms(), turns)
+    }
+
+    /// Leaves a deaf bus as it is: taking it down would panic.
+    pub fn abandon(self) {
+        self.stop.store(true, Relaxed);
+        std::mem::forget(self);
     }
 
     /// Stops the threads and closes the session, in two seconds at most.
     pub fn close(self) {
+        if self.hearing.last_failed() {
+            return self.abandon();
+        }
         let deadline = Instant::now() + CLOSE_TIMEOUT;
         self.stop.store(true, Relaxed);
         self.wake.iter().for_each(Thread::unpark);

@@ -8,7 +8,7 @@ use plica_scene::Config;
 use plica_scene::model::{self, SceneModelError};
 use plica_sim::Model;
 
-use crate::bus::{Bus, BusError, BusOptions, Parts, SceneInfo};
+use crate::bus::{Bus, BusError, BusOptions, Deaf, Parts, Peer, SceneInfo};
 use crate::database_loader::{Enrichment, EnrichmentError};
 use crate::limits::{FrameTooLarge, check_frame};
 use crate::realtime::{Grants, Loop, LoopOptions, Running, ThreadOptions, spawn};
@@ -73,6 +73,7 @@ impl Server {
         let grants = simulation.grants().clone();
         let parts = Parts {
             session,
+            ports_of_bus: Bus::ports(options),
             keys,
             scene: describe(config),
             model: Arc::clone(&model),
@@ -97,6 +98,33 @@ impl Server {
     /// False once the simulation thread has ended by itself, which is a fault.
     pub fn is_alive(&self) -> bool {
         self.simulation.is_alive()
+    }
+
+    /// Judges whether the bus still answers; call it several times a second. See [`Bus::listen`].
+    ///
+    /// # Errors
+    /// The bus is deaf: end the process with [`Server::abandon`].
+    pub fn listen(&mut self) -> Result<(), Deaf> {
+        self.bus.listen()
+    }
+
+    /// Turns of the simulation so far: it lives while they rise.
+    pub fn turns(&self) -> u64 {
+        self.bus.turns()
+    }
+
+    /// Far ends of the connections to the daemon's ports.
+    pub fn peers(&self) -> Vec<Peer> {
+        self.bus.peers()
+    }
+
+    /// Stops ticking and the running job, and leaves a deaf bus as it is.
+    pub fn abandon(self) {
+        let Self { bus, simulation, supervision, .. } = self;
+        supervision.iter().for_each(Supervision::begin_stop);
+        simulation.stop();
+        bus.abandon();
+        drop(supervision);
     }
 
     /// Stops ticking, closes the bus and ends the running job, in five seconds at most; without a job in three.

@@ -2,8 +2,10 @@
 
 pub mod cli;
 pub mod commands;
+pub mod deafness;
 pub mod demo;
 pub mod frames_file;
 pub mod logging;
 pub mod picture;
 pub mod roofline;
+mod service;

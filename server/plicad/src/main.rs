@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use plicad::cli::Cli;
+use plicad::deafness::{DEAF, Deafness};
 
 fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
@@ -24,8 +25,11 @@ fn main() -> ExitCode {
     }
 }
 
-/// A job that was asked to stop is not one that failed.
+/// A job that was asked to stop is not one that failed, and a deaf daemon is to be started again.
 fn exit_code(error: &anyhow::Error) -> ExitCode {
+    if error.is::<Deafness>() {
+        return ExitCode::from(DEAF);
+    }
     match error.downcast_ref() {
         Some(plica_training::TrainingError::Interrupted) => ExitCode::from(plica_training::INTERRUPTED),
         _ => ExitCode::FAILURE,

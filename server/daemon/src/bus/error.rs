@@ -24,6 +24,12 @@ pub enum BusError {
     /// The session name cannot be part of a key.
     #[error("--session: {0}")]
     Session(#[from] plica_protocol::keys::NameError),
+    /// Another daemon serves the session on the same bus.
+    #[error("{other}: stop it, or choose another --session")]
+    SecondDaemon {
+        /// The other one.
+        other: String,
+    },
     /// Anything else that Zenoh says.
     #[error("the bus cannot be opened on {endpoint}: {problem}")]
     Zenoh {

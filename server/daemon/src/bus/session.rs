@@ -2,15 +2,21 @@
 
 use std::net::TcpListener;
 use std::path::PathBuf;
+use std::time::Duration;
 
+use plica_protocol::keys::Keys;
 use plica_protocol::{DEFAULT_ENDPOINT, DEFAULT_SESSION};
 use zenoh::{Config, Session, Wait};
 
 use super::error::BusError;
+use super::hearing::{describe, other_daemon};
 use super::port_owner::owner_of_port;
 
 /// What a session is opened with when no file is given.
 pub const DEFAULT_ZENOH_CONFIG: &str = include_str!("../../../../configs/zenoh/default.json5");
+
+/// How long another daemon of the same session has to answer before this one begins.
+const OTHER_PATIENCE: Duration = Duration::from_secs(1);
 
 /// Where the daemon is found.
 #[derive(Debug, Clone)]
@@ -45,7 +51,37 @@ pub(super) fn open(options: &BusOptions) -> Result<Session, BusError> {
     if options.listen.is_some() || options.zenoh_config.is_none() {
         refuse_taken_port(&options.place())?;
     }
-    zenoh::open(config).wait().map_err(|e| BusError::Zenoh { endpoint: options.place(), problem: e.to_string() })
+    let session = zenoh::open(config).wait();
+    let session = session.map_err(|e| BusError::Zenoh { endpoint: options.place(), problem: e.to_string() })?;
+    refuse_second_daemon(&session, &options.session)?;
+    Ok(session)
+}
+
+/// Ports of this machine that the configuration listens on.
+pub(super) fn ports(options: &BusOptions) -> Vec<u16> {
+    let Ok(endpoints) = config(options).and_then(|c| {
+        c.get_json("listen/endpoints").map_err(|e| BusError::Config { file: options.place(), problem: e.to_string() })
+    }) else {
+        return Vec::new();
+    };
+    let port = |endpoint: &str| -> Option<u16> {
+        let address = endpoint.split(['?', '#']).next()?;
+        address.rsplit(':').next()?.parse().ok()
+    };
+    endpoints.split('"').filter_map(port).collect()
+}
+
+/// Two daemons of one session would answer the same questions, which clients cannot tell apart: the later one gives way.
+fn refuse_second_daemon(session: &Session, name: &str) -> Result<(), BusError> {
+    let keys = Keys::new(name)?;
+    let info = session.info();
+    if info.routers_zid().wait().next().is_none() && info.peers_zid().wait().next().is_none() {
+        return Ok(());
+    }
+    match other_daemon(session, &keys, OTHER_PATIENCE).flatten() {
+        Some(other) => Err(BusError::SecondDaemon { other: describe(&other, keys.root()) }),
+        None => Ok(()),
+    }
 }
 
 fn config(options: &BusOptions) -> Result<Config, BusError> {
@@ -72,7 +108,7 @@ fn refuse_taken_port(endpoint: &str) -> Result<(), BusError> {
             let owner = address.rsplit(':').next().and_then(|port| port.parse().ok()).and_then(owner_of_port);
             let owner = owner.map_or_else(
                 || ", probably by another plicad or a Zenoh router".into(),
-                |(pid, name)| format!(" by `{name}` (process {pid})"),
+                |process| format!(" by {process}"),
             );
             Err(BusError::AddressInUse { endpoint: endpoint.into(), owner })
         }

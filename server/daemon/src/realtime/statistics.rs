@@ -9,6 +9,8 @@ use super::histogram::AtomicHistogram;
 /// Written by the simulation thread alone.
 #[derive(Debug, Default)]
 pub struct Statistics {
+    /// Turns of the loop, ticks or not: the thread lives while they rise.
+    pub turns: AtomicU64,
     /// Duration of whole ticks.
     pub tick: AtomicHistogram,
     /// Duration of each stage, in the order of [`Stage::ALL`].

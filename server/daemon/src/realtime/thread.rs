@@ -148,6 +148,7 @@ fn run_in_lock_step(core: &mut Loop, stop: &AtomicBool) {
 }
 
 fn timed_turn(core: &mut Loop, timer: &mut StageTimer, statistics: &Statistics) {
+    statistics.turns.fetch_add(1, Relaxed);
     let begin = Instant::now();
     if let Turn::Ticked(_) = core.turn(timer) {
         statistics.tick.record(begin.elapsed().as_nanos() as u64);

@@ -1,9 +1,10 @@
 //! `plicad serve`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context;
+use plica_daemon::bus::Deaf;
 use plica_daemon::server::Server;
 use plica_jobs::{DataFolder, DataFolderError, Jobs, Launch, ServedScene, Supervision, default_path};
 use plica_scene::Config;
@@ -11,6 +12,8 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use crate::cli::ServeArgs;
+use crate::deafness::Deafness;
+use crate::service::Watchdog;
 
 const LOOK_AROUND: Duration = Duration::from_millis(100);
 
@@ -23,16 +26,28 @@ pub fn run(args: &ServeArgs, json: bool) -> anyhow::Result<()> {
         config.set_database(file.clone());
     }
     let options = args.bus.options();
-    let server = Server::start_with_jobs(&config, &options, args.lock_step, || open_jobs(args, &config))?;
+    let mut server = Server::start_with_jobs(&config, &options, args.lock_step, || open_jobs(args, &config))?;
     for warning in &server.grants().warnings {
         tracing::warn!("{warning}");
     }
     let pace = if args.lock_step { "in lock-step" } else { "in real time" };
     tracing::info!("serving {} {pace} on {} as session `{}`", config.name(), options.place(), options.session);
-    let outcome = wait(&server, &mut signals);
+    let mut watchdog = Watchdog::ready(&format!("serving {} on {}", config.name(), options.place()));
+    match wait(&mut server, &mut signals, &mut watchdog) {
+        End::Signal => {}
+        End::Dead => {
+            server.stop();
+            anyhow::bail!("the simulation thread has ended by itself; see the message above, and report it");
+        }
+        End::Deaf(Deaf { silent_ms }) => {
+            let deafness = Deafness::note(silent_ms, &server.peers(), data_path(args).ok().as_deref());
+            server.abandon();
+            return Err(deafness.into());
+        }
+    }
+    watchdog.stopping();
     server.stop();
     tracing::info!("stopped");
-    outcome?;
     if json {
         println!("{}", serde_json::json!({ "scene": config.name(), "stopped": true }));
     }
@@ -43,7 +58,7 @@ pub fn run(args: &ServeArgs, json: bool) -> anyhow::Result<()> {
 /// its status; one that another daemon has is an error.
 fn open_jobs(args: &ServeArgs, config: &Config) -> Result<(Jobs, Option<Supervision>), DataFolderError> {
     let session = &args.bus.session;
-    let path = match args.data.clone().map_or_else(|| default_path(session), Ok) {
+    let path = match data_path(args) {
         Ok(path) => path,
         Err(problem) => return Ok(without_jobs(problem)),
     };
@@ -59,20 +74,37 @@ fn open_jobs(args: &ServeArgs, config: &Config) -> Result<(Jobs, Option<Supervis
     Ok(started.map_or_else(|e| without_jobs(e.to_string()), |(jobs, supervision)| (jobs, Some(supervision))))
 }
 
+fn data_path(args: &ServeArgs) -> Result<PathBuf, String> {
+    args.data.clone().map_or_else(|| default_path(&args.bus.session), Ok)
+}
+
 fn without_jobs(problem: String) -> (Jobs, Option<Supervision>) {
     tracing::warn!("no jobs: {problem}");
     (Jobs::unavailable(problem), None)
 }
 
-fn wait(server: &Server, signals: &mut Signals) -> anyhow::Result<()> {
+/// Why the daemon ends.
+enum End {
+    /// SIGINT or SIGTERM.
+    Signal,
+    /// The simulation thread has panicked.
+    Dead,
+    /// The bus answers no more.
+    Deaf(Deaf),
+}
+
+fn wait(server: &mut Server, signals: &mut Signals, watchdog: &mut Watchdog) -> End {
     loop {
         if signals.pending().next().is_some() {
-            return Ok(());
+            return End::Signal;
         }
-        anyhow::ensure!(
-            server.is_alive(),
-            "the simulation thread has ended by itself; see the message above, and report it"
-        );
+        if !server.is_alive() {
+            return End::Dead;
+        }
+        if let Err(deaf) = server.listen() {
+            return End::Deaf(deaf);
+        }
+        watchdog.feed(server.turns());
         std::thread::sleep(LOOK_AROUND);
     }
 }
