@@ -2,8 +2,9 @@
 
 use nalgebra::Vector3;
 
+use super::report::Info;
 use super::sufficient_decrease::{Judgement, Start, Total};
-use super::{Info, Problem, Residual, Solver, dot};
+use super::{Problem, Residual, Solver, dot};
 
 /// Largest slope after a step, as a share of the first, where energy differences are rounding \[HZ05\].
 const SLOPE_LEFT: f64 = 0.9;

@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::Point3;
 
-use super::error::{Fault, Place, fault};
-use super::{Group, Groups, NamedMesh};
+use super::NamedMesh;
+use super::error::{DAMAGED, Fault, Place, fault};
+use super::groups::{Group, Groups};
 use crate::hex_mesh::{HexMesh, MeshError};
 use crate::index::{HexIdx, NodeIdx};
 use crate::isoparametric;
@@ -132,7 +133,7 @@ impl Content {
     fn mesh_fault(&self, error: &MeshError, numbers: &[usize]) -> Fault {
         let advice = match error {
             MeshError::Inverted { .. } => "untangle the mesh, or turn mirrored hexahedra round",
-            MeshError::NonFinite { .. } => super::error::DAMAGED,
+            MeshError::NonFinite { .. } => DAMAGED,
             _ => "mend the mesh: every face belongs to one or two hexahedra",
         };
         let (place, count) = match error {

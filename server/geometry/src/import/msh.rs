@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use nalgebra::Point3;
 
 use super::assemble::{Cell, Content, Labels, Shape};
-use super::error::{DAMAGED, Fault, fault};
+use super::error::{DAMAGED, Fault, Place, fault};
 use elements::{Element, Kind};
 use reader::Reader;
 
@@ -165,6 +165,6 @@ impl Tale {
     fn refuse_unfit(&self) -> Result<(), Fault> {
         let Some((element, count)) = self.unfit.first() else { return Ok(()) };
         let problem = format!("holds {count} {}; 8-node hexahedra are read", element.name);
-        fault(super::Place::Field("$Elements".into(), None), problem, element.advice())
+        fault(Place::Field("$Elements".into(), None), problem, element.advice())
     }
 }

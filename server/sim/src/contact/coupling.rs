@@ -2,8 +2,9 @@
 
 use nalgebra::Vector6;
 
-use super::proxy::{at_arm, transposed_at_arm};
-use super::{M3, ProxyMotion, Rows, V3};
+use super::proxy::{ProxyMotion, at_arm, transposed_at_arm};
+use super::rows::Rows;
+use super::{M3, V3};
 use crate::lanes::Node;
 
 /// Scratch of the contact operator.

@@ -6,8 +6,9 @@
 
 use plica_geometry::CLUSTER_SIZE;
 
-use super::solid::{nearest_on_segment, nearest_segments};
-use super::{Placement, SkinSurface, Solid, V3};
+use super::V3;
+use super::solid::{Placement, Solid, nearest_on_segment, nearest_segments};
+use super::surface::SkinSurface;
 use crate::embedding::SkinPositions;
 
 /// Features closer than this share of an edge to its end are left to the end.

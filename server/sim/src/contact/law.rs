@@ -6,8 +6,8 @@
 //! A row sticks while `beta = 1`. Inside the linear solve `f_n` is not cut at zero; a row that pulls is switched off and
 //! the solve goes on without it.
 
-use super::rows::{Row, tangent};
-use super::{M3, Rows, V3};
+use super::rows::{Row, Rows, tangent};
+use super::{M3, V3};
 
 /// A sticking contact begins to slide this far beyond the cone.
 const STICK_MARGIN: f32 = 1.02;

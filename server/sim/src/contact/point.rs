@@ -3,7 +3,10 @@
 //! For a tool with an axis: where the axis meets the deformed skin, pulled back. For a ball, or where the axis misses:
 //! the centroid of smooth contact weights, 1 at gap <= 0 and falling to 0 at 1 mm. Never a vertex: it jitters.
 
-use super::{Detector, Search, SkinSurface, Solid, V3};
+use super::V3;
+use super::detect::{Detector, Search};
+use super::solid::Solid;
+use super::surface::SkinSurface;
 use crate::embedding::SkinPositions;
 
 /// Gap at which a vertex no longer counts as touching \[m\].

@@ -7,7 +7,8 @@
 
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
-use super::{Rows, V3};
+use super::V3;
+use super::rows::Rows;
 use crate::description::{Coupling, SpringCoupling, ToolDescription};
 use crate::tool::Target;
 

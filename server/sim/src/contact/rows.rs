@@ -1,6 +1,8 @@
 //! Constraint rows: which candidates become rows, and what they inherit from the contacts of the last tick.
 
-use super::{Candidate, SkinSurface, V3};
+use super::V3;
+use super::detect::Candidate;
+use super::surface::SkinSurface;
 use crate::embedding::SkinEmbedding;
 use crate::lanes::Node;
 

@@ -1,12 +1,12 @@
 //! One way to enrich: how the present state is compared with the examples, and how their detail is laid on the skin.
 
-use super::charts::{ChartOptions, Charts};
 use super::correlation::Correlation;
 use super::error::EnricherError;
 use super::examples::{Examples, SeenExamples, check, without_duplicates};
 use super::fade::Trust;
 use super::field::{Field, FieldScratch};
 use super::kriging::KrigingChoice;
+use super::layout::{ChartOptions, Charts};
 use super::options::{Correlator, EnrichmentOptions};
 use super::rescale::Rescale;
 use super::situation::{Contact, Offsets, Touch, coordinates};

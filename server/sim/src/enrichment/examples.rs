@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::charts::{Charts, FAR};
 use super::error::EnricherError;
+use super::layout::{Charts, FAR};
 use super::situation::{Contact, Offsets, Situation, Touch};
 use super::surface::{Place, Surface};
 use crate::lanes::{F, Node};

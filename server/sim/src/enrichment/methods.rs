@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::charts::Coordinates;
 use super::field::{FieldOptions, Interpolator};
+use super::layout::Coordinates;
 use super::linear::LinearKind;
 use super::modes::Precision;
 use super::options::{Correlator, EnrichmentOptions};

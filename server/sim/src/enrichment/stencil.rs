@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 use plica_geometry::{ReferenceSkin, VertexIdx};
 
-use super::charts::anchors;
+use super::layout::anchors;
 use super::situation::Situation;
 
 /// Points per axis.

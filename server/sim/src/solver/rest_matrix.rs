@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Matrix3;
 use plica_geometry::HexMesh;
 
-use super::NodeOrder;
+use super::ordering::NodeOrder;
 use crate::description::{ElementKind, Material};
 use crate::element::rest_stiffness;
 

@@ -2,10 +2,10 @@
 
 use nalgebra::Point3;
 
+use super::Tale;
 use super::elements::Element;
 use super::reader::Reader;
-use super::{Fault, Tale, fault};
-use crate::import::error::DAMAGED;
+use crate::import::error::{DAMAGED, Fault, fault};
 
 /// `$Nodes`: a count as text, then tag and position of every node.
 pub(super) fn read_nodes(tale: &mut Tale, reader: &mut Reader<'_>) -> Result<(), Fault> {

@@ -2,10 +2,10 @@
 
 use nalgebra::Point3;
 
+use super::Tale;
 use super::elements::Element;
 use super::reader::Reader;
-use super::{Fault, Tale, fault};
-use crate::import::error::DAMAGED;
+use crate::import::error::{DAMAGED, Fault, fault};
 
 /// `$Entities`: points, curves, surfaces, volumes, each with its box, physical groups and boundary.
 pub(super) fn read_entities(tale: &mut Tale, reader: &mut Reader<'_>) -> Result<(), Fault> {

@@ -14,7 +14,7 @@ mod solid;
 mod surface;
 
 pub(crate) use coupling::ContactCoupling;
-pub(crate) use detect::{Candidate, Detector, Search};
+pub(crate) use detect::{Detector, Search};
 pub(crate) use law::{evaluate, predict_secant, settle, stack_forces};
 pub(crate) use point::{ContactPoint, contact_point};
 pub(crate) use proxy::{Proxy, ProxyMotion, at_arm};
