@@ -16,6 +16,7 @@ mod model;
 mod probe;
 mod report;
 mod rotation;
+mod smoothstep;
 mod solver;
 mod state;
 mod step;

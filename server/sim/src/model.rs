@@ -257,7 +257,7 @@ struct RestInverse {
 impl RestInverse {
     /// `None` if a block is singular.
     fn new(d: &ModelDescription, order: &NodeOrder, mass: &[f64], h: f64) -> Option<Self> {
-        let matrix = RestMatrix::new(&d.mesh, order, mass, &d.materials, d.element, (h, d.mass_damping_per_s));
+        let matrix = RestMatrix::new(d, order, mass, h);
         let wants_factor = match d.solver.preconditioner {
             Preconditioner::Auto => BlockTridiagonal::bytes_for(order) <= AUTO_FACTOR_BYTES,
             Preconditioner::BlockTridiagonal => true,

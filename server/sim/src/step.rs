@@ -9,7 +9,7 @@ use crate::contact::{
     ContactCoupling, Placement, ProxyMotion, Rows, Search, Selection, V3, at_arm, contact_point, evaluate,
     predict_secant, settle, stack_forces,
 };
-use crate::lanes::Node;
+use crate::lanes::{Mat3, Node};
 use crate::model::Model;
 use crate::probe::{Probe, Stage};
 use crate::report::TickReport;
@@ -238,7 +238,8 @@ fn solve(model: &Model, workspace: &mut Workspace, residual_bound: f32) -> (CgIn
     let options = &model.description.solver;
     let Workspace { rotations, warp, cg, dv, residual, dv_before, residual_before, rows, coupling, motions, .. } =
         workspace;
-    let mut multiply = |p: &[Node], out: &mut [Node]| multiply(model, rotations, (coupling, rows, motions), p, out);
+    let mut matrix = ImplicitMatrix { model, rotations, coupling, rows, motions };
+    let mut multiply = |p: &[Node], out: &mut [Node]| matrix.multiply(p, out);
     let primary = CgStop { residual: residual_bound, max_iterations: options.max_iterations };
     let Some(tridiagonal) = &model.tridiagonal else {
         let jacobi = |r: &[Node], z: &mut [Node]| model.jacobi.apply(r, z);
@@ -259,25 +260,30 @@ fn solve(model: &Model, workspace: &mut Workspace, residual_bound: f32) -> (CgIn
     (CgInfo { iterations: info.iterations + second.iterations, ..second }, true)
 }
 
-/// `out = A p`
-#[inline(always)]
-fn multiply(
-    model: &Model,
-    rotations: &[crate::lanes::Mat3],
-    (coupling, rows, motions): (&mut ContactCoupling, &Rows, &[ProxyMotion]),
-    p: &[Node],
-    out: &mut [Node],
-) {
-    let h = model.dt;
-    let inertia = 1.0 + h * model.description.mass_damping_per_s as f32;
-    set_zero(out);
-    model.elements.add_product(p, h * h, rotations, out);
-    for ((out, p), m) in out.iter_mut().zip(p).zip(&model.node_mass) {
-        for k in 0..4 {
-            out[k] = (m * inertia).mul_add(p[k], out[k]);
+/// `A` at the present rotations, with the active contact rows.
+struct ImplicitMatrix<'a> {
+    model: &'a Model,
+    rotations: &'a [Mat3],
+    coupling: &'a mut ContactCoupling,
+    rows: &'a Rows,
+    motions: &'a [ProxyMotion],
+}
+
+impl ImplicitMatrix<'_> {
+    /// `out = A p`
+    #[inline(always)]
+    fn multiply(&mut self, p: &[Node], out: &mut [Node]) {
+        let h = self.model.dt;
+        let inertia = 1.0 + h * self.model.description.mass_damping_per_s as f32;
+        set_zero(out);
+        self.model.elements.add_product(p, h * h, self.rotations, out);
+        for ((out, p), m) in out.iter_mut().zip(p).zip(&self.model.node_mass) {
+            for k in 0..4 {
+                out[k] = (m * inertia).mul_add(p[k], out[k]);
+            }
         }
+        self.coupling.add_product(self.rows, self.motions, h, p, out);
     }
-    coupling.add_product(rows, motions, h, p, out);
 }
 
 /// `v += dv`, `x += h v`; nodes faster than [`MAX_NODE_SPEED`] are slowed to it.

@@ -8,6 +8,7 @@ use super::detect::{Detector, Search};
 use super::solid::Solid;
 use super::surface::SkinSurface;
 use crate::embedding::SkinPositions;
+use crate::smoothstep::smoothstep;
 
 /// Gap at which a vertex no longer counts as touching \[m\].
 const BAND: f32 = 1e-3;
@@ -76,8 +77,7 @@ fn line_hits(origin: &V3, direction: &V3, [a, b, c]: &[V3; 3]) -> Option<(f32, [
 fn smooth_centroid(surface: &SkinSurface, skin: &SkinPositions, detector: &Detector) -> Option<ContactPoint> {
     let (mut total, mut deformed, mut reference) = (0.0, V3::zeros(), V3::zeros());
     for (vertex, gap) in detector.near_vertices().filter(|&(_, gap)| gap < BAND) {
-        let x = 1.0 - (gap / BAND).clamp(0.0, 1.0);
-        let weight = x * x * (3.0 - 2.0 * x) * surface.vertex_areas[vertex];
+        let weight = smoothstep(1.0 - (gap / BAND).clamp(0.0, 1.0)) * surface.vertex_areas[vertex];
         total += weight;
         deformed += V3::from(skin.vertex(vertex)) * weight;
         reference += surface.rest[vertex] * weight;

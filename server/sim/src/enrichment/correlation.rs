@@ -42,8 +42,8 @@ impl Correlation {
             Correlator::Rescale => Self::None,
             Correlator::Ssh12(options) => Self::Ssh12(Ssh12::new(situations, options)),
             Correlator::Linear(kind) => {
-                let mesh = (&model.description().mesh, &model.order);
-                Self::Linear(Linear::new(kind, situations, products, mesh).ok_or_else(singular)?)
+                let mesh = &model.description().mesh;
+                Self::Linear(Linear::new(kind, situations, products, mesh, &model.order).ok_or_else(singular)?)
             }
             Correlator::Rbf { width_cells } => {
                 Self::Rbf(Rbf::new(situations, products, width_cells * cell).ok_or_else(singular)?)

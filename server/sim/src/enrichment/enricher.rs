@@ -4,7 +4,7 @@ use super::correlation::Correlation;
 use super::error::EnricherError;
 use super::examples::{Examples, SeenExamples, check, without_duplicates};
 use super::fade::Trust;
-use super::field::{Field, FieldScratch};
+use super::field::{Field, FieldScratch, TrainingSet};
 use super::kriging::KrigingChoice;
 use super::layout::{ChartOptions, Charts};
 use super::options::{Correlator, EnrichmentOptions};
@@ -68,14 +68,14 @@ impl Enricher {
         } else {
             Rescale::none(radius_m)
         };
-        let taught = if needs_examples {
-            (&situations[..], &examples.details[..])
-        } else {
-            (&situations[..0], &examples.details[..0])
-        };
-        let field = Field::new(options.field, radius_m, &rescale, surface.reference(), taught);
-        let correlation = Correlation::new(model, surface.reference(), options.correlator, taught.0, field.products())?;
-        let (n_examples, n_nodes) = (taught.0.len(), model.n_nodes());
+        let n_examples = if needs_examples { situations.len() } else { 0 };
+        let training_set =
+            TrainingSet { situations: &situations[..n_examples], details: &examples.details[..n_examples] };
+        let field = Field::new(options.field, radius_m, &rescale, surface.reference(), training_set);
+        let correlator = options.correlator;
+        let correlation =
+            Correlation::new(model, surface.reference(), correlator, training_set.situations, field.products())?;
+        let n_nodes = model.n_nodes();
         drop(situations);
         Ok(Self { options, surface, charts, correlation, field, n_examples, n_nodes, radius: radius_m as f32 })
     }

@@ -1,5 +1,7 @@
 //! From how new a state is to how much its detail is trusted.
 
+use crate::smoothstep::smoothstep;
+
 /// Trust of a correlator in its weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Trust {
@@ -36,12 +38,6 @@ impl Fade {
         let share = 1.0 - smoothstep((novelty - self.begin) / (self.end - self.begin));
         Trust { share, confidence: share * (1.0 - novelty).clamp(0.0, 1.0) }
     }
-}
-
-/// From 0 at `x = 0` to 1 at `x = 1`, level at both ends.
-pub(crate) fn smoothstep(x: f32) -> f32 {
-    let x = x.clamp(0.0, 1.0);
-    x * x * (3.0 - 2.0 * x)
 }
 
 /// `W`: 1 up to the first share of the radius, 0 from the second on.

@@ -55,7 +55,15 @@ pub struct FieldOptions {
     pub control_variate: bool,
 }
 
-/// Examples' detail, ready to be blended.
+/// Examples that a method is trained on.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TrainingSet<'a> {
+    pub(crate) situations: &'a [Situation<'a>],
+    /// `[n][n_skin]` \[m\]
+    pub(crate) details: &'a [Vec<[f32; 3]>],
+}
+
+/// Detail of the examples, ready to be blended.
 #[derive(Debug, Clone)]
 pub(crate) struct Field {
     options: FieldOptions,
@@ -80,14 +88,15 @@ pub(crate) struct FieldScratch {
 }
 
 impl Field {
-    /// `details` are the examples', `[n][n_skin]` \[m\]; without examples only rescaling is left.
+    /// Tables of the examples' detail; an empty training set leaves rescaling alone.
     pub(crate) fn new(
         options: FieldOptions,
         radius: f64,
         rescale: &Rescale,
         skin: &ReferenceSkin,
-        (situations, details): (&[Situation<'_>], &[Vec<[f32; 3]>]),
+        training_set: TrainingSet<'_>,
     ) -> Self {
+        let TrainingSet { situations, details } = training_set;
         let mut this = Self::without_examples(options, radius, rescale);
         if situations.is_empty() {
             return this;
@@ -247,14 +256,14 @@ impl Field {
         scratch: &mut FieldScratch,
         mut each: impl FnMut(usize, &[Node; LANES]),
     ) {
-        let FieldScratch { coefficients, planar, texels } = scratch;
-        self.blend_stamps(situation, weights, (coefficients, planar), texels);
+        self.blend_stamps(situation, weights, scratch);
+        let texels = &scratch.texels;
         let (far, share) = (f32x4::splat(self.far), f32x4::splat(share));
         for (group, q) in situation.layout.iter().enumerate() {
-            let (texel, x, y) = self.lattice.locate(q);
+            let located = self.lattice.locate(q);
             let offsets = situation.offsets.group(group);
             let detail = std::array::from_fn(|lane| {
-                let sampled = self.lattice.sample(texels, (texel[lane], x[lane], y[lane]));
+                let sampled = self.lattice.sample(texels, located.lane(lane));
                 let rescaled = far + f32x4::splat(sampled.to_array()[3]);
                 (share * (sampled - rescaled * f32x4::from(offsets[lane]))).to_array()
             });
@@ -263,13 +272,8 @@ impl Field {
     }
 
     /// Blended, turned to the world, with the shade of the rescaling as fourth component.
-    fn blend_stamps(
-        &self,
-        situation: &Situation<'_>,
-        weights: &[f32],
-        (coefficients, planar): (&mut [f32], &mut [F]),
-        texels: &mut [Pair],
-    ) {
+    fn blend_stamps(&self, situation: &Situation<'_>, weights: &[f32], scratch: &mut FieldScratch) {
+        let FieldScratch { coefficients, planar, texels } = scratch;
         let n = self.texel_groups.n();
         let Some(stamps) = &self.stamps else {
             let shade = self.shade.iter().enumerate();

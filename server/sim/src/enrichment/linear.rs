@@ -43,7 +43,8 @@ impl Linear {
         kind: LinearKind,
         situations: &[Situation<'_>],
         products: &DMatrix<f64>,
-        (mesh, order): (&HexMesh, &NodeOrder),
+        mesh: &HexMesh,
+        order: &NodeOrder,
     ) -> Option<Self> {
         let n_free = situations[0].displacements.len();
         let column = |k: usize, s: &Situation<'_>| f64::from(s.displacements[k / 3][k % 3]);

@@ -12,7 +12,6 @@ use super::clearance::keep_clear;
 use super::enricher::{Enricher, EnricherScratch};
 use super::fade::Trust;
 use super::situation::{Contact, Touch, vector};
-use crate::contact::V3;
 use crate::lanes::{LANES, Node};
 use crate::model::Model;
 use crate::state::State;
@@ -153,8 +152,7 @@ impl LiveEnrichment {
             self.write_all(model, state, out)
         };
         for (reading, solid) in state.tools().iter().zip(&model.solids).filter(|(r, _)| r.present && reach > 0.0) {
-            let coarse = |v: usize| V3::from(state.skin.vertex(v));
-            keep_clear(solid, &placement(&reading.proxy), (state.skin.boxes(), reach), coarse, out);
+            keep_clear(solid, &placement(&reading.proxy), &state.skin, reach, out);
         }
     }
 

@@ -26,6 +26,13 @@ pub(crate) struct Place {
     pub(crate) frame: ContactFrame,
 }
 
+/// Nearest vertex found so far.
+struct NearestVertex {
+    vertex: usize,
+    /// Squared distance \[m^2\].
+    squared: f64,
+}
+
 impl Surface {
     /// Frames lie along the tangential part of the first of `axes` that has one.
     pub(crate) fn new(skin: &Skin, axes: [Vector3<f64>; 2]) -> Self {
@@ -79,22 +86,22 @@ impl Surface {
     pub(crate) fn nearest(&self, p: &Point3<f64>) -> usize {
         let squared = |[low, high]: &[Point3<f64>; 2]| (p - p.sup(low).inf(high)).norm_squared();
         let first = (0..self.boxes.len()).min_by(|a, b| squared(&self.boxes[*a]).total_cmp(&squared(&self.boxes[*b])));
-        let mut best = (f64::INFINITY, 0);
-        self.look_into(first.unwrap_or(0), p, &mut best);
+        let mut best = NearestVertex { vertex: 0, squared: f64::INFINITY };
+        self.search_cluster(first.unwrap_or(0), p, &mut best);
         for (cluster, bounds) in self.boxes.iter().enumerate() {
-            if squared(bounds) < best.0 {
-                self.look_into(cluster, p, &mut best);
+            if squared(bounds) < best.squared {
+                self.search_cluster(cluster, p, &mut best);
             }
         }
-        best.1
+        best.vertex
     }
 
-    fn look_into(&self, cluster: usize, p: &Point3<f64>, best: &mut (f64, usize)) {
+    fn search_cluster(&self, cluster: usize, p: &Point3<f64>, best: &mut NearestVertex) {
         let first = cluster * CLUSTER_SIZE;
         for (lane, q) in self.reference.skin().positions()[first..].iter().take(CLUSTER_SIZE).enumerate() {
             let squared = (p - q).norm_squared();
-            if squared < best.0 {
-                *best = (squared, first + lane);
+            if squared < best.squared {
+                *best = NearestVertex { vertex: first + lane, squared };
             }
         }
     }
