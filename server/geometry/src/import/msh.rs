@@ -29,7 +29,7 @@ struct MshContent {
     unsupported: Vec<(&'static Element, usize)>,
 }
 
-/// A version that is read.
+/// Supported version.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Version {
     V2,
@@ -118,7 +118,7 @@ impl MshContent {
         Ok(())
     }
 
-    /// Takes an element of known kind by its corners, under its physical groups.
+    /// Adds an element by its corners, with its physical groups.
     fn add_element(
         &mut self,
         reader: &Reader<'_>,
@@ -161,7 +161,7 @@ impl MshContent {
         }
     }
 
-    /// A mesh with other volumes than 8-node hexahedra would have holes where they are.
+    /// Refuses volumes other than 8-node hexahedra: leaving them out would make holes.
     fn refuse_unsupported(&self) -> Result<(), Fault> {
         let Some((element, count)) = self.unsupported.first() else { return Ok(()) };
         let problem = format!("holds {count} {}; 8-node hexahedra are read", element.name);

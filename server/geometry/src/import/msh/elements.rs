@@ -51,7 +51,7 @@ const fn high(code: i32, name: &'static str, n_nodes: usize) -> Element {
     Element { code, name, n_nodes, kind: Kind::HighOrder }
 }
 
-/// The types that Gmsh writes up to third order; corners come first in each.
+/// Types that Gmsh writes up to third order; corners come first in each.
 const ELEMENTS: [Element; 30] = [
     supported(15, "points", 1, Shape::Point),
     supported(1, "2-node lines", 2, Shape::Line),

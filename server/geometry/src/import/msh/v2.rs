@@ -85,7 +85,7 @@ fn tag(reader: &mut Reader<'_>) -> Result<u64, Fault> {
     count(reader)
 }
 
-/// A number from 0 that the file holds as a signed one.
+/// A non-negative number stored as a signed one.
 fn count(reader: &mut Reader<'_>) -> Result<u64, Fault> {
     let number = reader.number::<i32>()?;
     match u64::try_from(number) {

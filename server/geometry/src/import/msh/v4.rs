@@ -30,7 +30,7 @@ pub(super) fn read_entities(content: &mut MshContent, reader: &mut Reader<'_>) -
     reader.end_section("Entities")
 }
 
-/// A count and as many numbers.
+/// A count, then that many numbers.
 fn read_tags(reader: &mut Reader<'_>) -> Result<Vec<i32>, Fault> {
     let n = reader.number::<u64>()?;
     (0..n).map(|_| reader.number()).collect()
@@ -87,7 +87,7 @@ pub(super) fn read_elements(content: &mut MshContent, reader: &mut Reader<'_>) -
     reader.end_section("Elements")
 }
 
-/// Numbers of blocks and things, least and largest tag.
+/// Numbers of blocks and entries, least and largest tag.
 fn read_header(reader: &mut Reader<'_>) -> Result<[u64; 4], Fault> {
     let header = [reader.number()?, reader.number()?, reader.number()?, reader.number()?];
     if header[1] > u64::from(u32::MAX) {
