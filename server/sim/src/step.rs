@@ -20,18 +20,18 @@ use crate::workspace::Workspace;
 
 /// Passes in which rows may switch either way.
 const FREE_PASSES: u32 = 4;
-/// Passes in all; the later ones only switch rows off and lower their friction.
+/// Largest number of passes; later ones only switch rows off and lower their friction.
 const MAX_PASSES: u32 = 12;
-/// A solve may leave this share of the contact impulse as residual.
+/// Residual of a solve, as a share of the contact impulse.
 const IMPULSE_TOLERANCE: f32 = 1e-4;
-/// A multiplier may grow to what presses its skin point this many cells deep.
+/// Indentation whose static force bounds a multiplier, in cells.
 const MAX_PRESS_CELLS: f32 = 4.0;
-/// One step sets out to resolve no more penetration than this share of a cell.
+/// Largest penetration that one step resolves, in cells.
 const MAX_CORRECTION_CELLS: f32 = 0.1;
-/// No node gets faster \[m/s\]: several times what a hand or a free ring-down reaches, and a bound on what a tool that is
-/// forced through the object can fling.
+/// Speed limit of nodes \[m/s\]: several times the speeds of a hand or a free ring-down, and a bound on those from a
+/// tool forced through the object.
 const MAX_NODE_SPEED: f32 = 10.0;
-/// Contacts are looked for no farther than this many cells away.
+/// Largest reach of contact detection, in cells.
 const MAX_REACH_CELLS: f32 = 2.0;
 
 /// One step of `model.dt`; sub-step `index` of the tick.
@@ -104,7 +104,7 @@ fn load_residual(model: &Model, state: &State, workspace: &mut Workspace) {
     }
 }
 
-/// The part of this tick's motion that belongs to one sub-step.
+/// Part of this tick's motion in one sub-step.
 fn substep_target(model: &Model, index: u32, target: &Target) -> Target {
     let n = f64::from(model.description.substeps);
     let at = |share: f64| {
@@ -182,8 +182,9 @@ fn find_contacts(model: &Model, state: &State, workspace: &mut Workspace, report
 
 /// Displacements before the solve, stiffness, and which rows are expected to push.
 ///
-/// Stiffness `kappa / (h^2 w o)`: `1 / (h^2 w)` is what the skin point itself resists with, mass included, so that nothing
-/// depends on Young's modulus or the time step; `o` counts the rows that load the same place. A floor on `w` keeps points
+/// Stiffness `kappa / (h^2 w o)`: `1 / (h^2 w)` is the stiffness of the skin point itself, mass included, so that
+/// `kappa` depends on neither Young's modulus nor the time step; `o` counts the rows that load the same surroundings. A
+/// floor on `w` keeps points
 /// next to fixed nodes from becoming infinitely stiff.
 fn predict_rows(model: &Model, rows: &mut Rows, motions: &[ProxyMotion]) {
     let (h, kappa) = (model.dt, model.description.contact.stiffness_ratio as f32);
@@ -300,7 +301,7 @@ fn advance(model: &Model, state: &mut State, workspace: &Workspace) {
     }
 }
 
-/// Multipliers for the next step, and what the report says about contact.
+/// Multipliers for the next step, and contact figures of the report.
 fn remember_contacts(model: &Model, state: &mut State, workspace: &mut Workspace, report: &mut TickReport) {
     let options = &model.description.contact;
     let decay = (1.0 - f64::from(model.dt) / options.recovery_time_s).max(0.0) as f32;

@@ -9,9 +9,9 @@ use crate::description::{Sampling, ToolDescription};
 pub struct PoseSample {
     /// Sequence number of its source.
     pub sequence: u64,
-    /// Time on its source's clock \[ns\], if the source knows it; else the time of arrival stands in.
+    /// Time on its source's clock \[ns\], if known; else the time of arrival.
     pub source_time_ns: Option<u64>,
-    /// Whether the tracker saw the marker; an invalid sample is no news.
+    /// Whether the tracker saw the marker; an invalid sample is ignored.
     pub valid: bool,
     /// `tracker <- marker` \[m\].
     pub pose: Isometry3<f64>,
@@ -35,10 +35,10 @@ struct Arrived {
     /// Counts samples, from 1.
     number: u64,
     arrival_s: f64,
-    /// Time on the source's clock, if it knows it.
+    /// Time on the source's clock, if known.
     source_s: Option<f64>,
     world_from_tool: Isometry3<f64>,
-    /// The tool cannot have moved here from the sample before: it is placed.
+    /// Motion from the previous sample exceeds the speed limit: the tool is re-placed.
     is_jump: bool,
 }
 
@@ -57,7 +57,7 @@ pub(crate) struct PoseTrack {
     reached: u64,
 }
 
-/// Where the device is at the end of this tick, and how it moved in it.
+/// Motion of the device in this tick.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Target {
     pub(crate) pose: Isometry3<f64>,
@@ -81,7 +81,7 @@ impl PoseTrack {
         }
     }
 
-    /// Takes a sample in. Returns false, and changes nothing, if a component is not finite.
+    /// Adds a sample. Returns false, without change, if a component is not finite.
     pub(crate) fn push(&mut self, tool: &ToolDescription, sample: &PoseSample, clock_s: f64) -> bool {
         if !is_finite(&sample.pose) {
             return false;
@@ -143,7 +143,7 @@ impl PoseTrack {
         self.ring.iter().flatten().any(|s| s.is_jump && s.number > self.reached && s.number <= number)
     }
 
-    /// The source's clock went back: it started again, and old times mean nothing any more.
+    /// Drops all samples: the source's clock went back, so it restarted.
     fn forget_source(&mut self) {
         self.ring = [None; RING];
         self.clock_offset_s = f64::INFINITY;
@@ -169,7 +169,7 @@ impl PoseTrack {
         after.map(|a| (a.world_from_tool, a.number))
     }
 
-    /// When a sample was taken, on the caller's clock: its source's time shifted by the smallest latency seen \[s\].
+    /// Time of a sample on the caller's clock: its source's time shifted by the smallest latency seen \[s\].
     fn clock_time_s(&self, sample: &Arrived) -> f64 {
         sample.source_s.map_or(sample.arrival_s, |s| s + self.clock_offset_s)
     }
@@ -183,7 +183,7 @@ pub fn world_from_tool(tool: &ToolDescription, tracker_from_marker: &Isometry3<f
         * tool.tool_from_marker.inverse()
 }
 
-/// Whether the tool would have to be faster than it may be to get from one sample to the next.
+/// Whether the motion between two samples exceeds the speed limit.
 fn is_jump(from: &Arrived, to: &Arrived, max_speed: f64) -> bool {
     let distance = (to.world_from_tool.translation.vector - from.world_from_tool.translation.vector).norm();
     let by_source = to.source_s.zip(from.source_s).map_or(0.0, |(to, from)| to - from);

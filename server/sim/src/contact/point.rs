@@ -10,7 +10,7 @@ use super::surface::SkinSurface;
 use crate::embedding::SkinPositions;
 use crate::smoothstep::smoothstep;
 
-/// Gap at which a vertex no longer counts as touching \[m\].
+/// Gap from which a vertex has no weight \[m\].
 const BAND: f32 = 1e-3;
 
 /// A contact point, deformed and on the reference skin \[m\].
@@ -20,7 +20,7 @@ pub(crate) struct ContactPoint {
     pub(crate) reference: V3,
 }
 
-/// `None` if nothing is near. `detector` holds what it found for this body.
+/// Contact point of a body; `None` without skin nearby. `detector` holds the result of its search for this body.
 pub(crate) fn contact_point(search: &Search<'_>, detector: &Detector) -> Option<ContactPoint> {
     let on_axis = if search.solid.has_axis() { on_axis(search, detector) } else { None };
     on_axis.or_else(|| smooth_centroid(search.surface, search.skin, detector))
