@@ -31,7 +31,7 @@ const RING: usize = 16;
 
 /// A sample in world coordinates with its arrival.
 #[derive(Debug, Clone, Copy)]
-struct Arrived {
+struct ReceivedPose {
     /// Counts samples, from 1.
     number: u64,
     arrival_s: f64,
@@ -45,7 +45,7 @@ struct Arrived {
 /// The pose ring of one tool and the target that its proxy follows.
 #[derive(Debug, Clone)]
 pub(crate) struct PoseTrack {
-    ring: [Option<Arrived>; RING],
+    ring: [Option<ReceivedPose>; RING],
     newest: usize,
     /// Smallest `arrival - source time` seen \[s\].
     clock_offset_s: f64,
@@ -90,7 +90,7 @@ impl PoseTrack {
             return true;
         }
         let source_s = sample.source_time_ns.map(|ns| ns as f64 * 1e-9);
-        let mut arrived = Arrived {
+        let mut received = ReceivedPose {
             number: 1,
             arrival_s: clock_s,
             source_s,
@@ -98,14 +98,14 @@ impl PoseTrack {
             is_jump: false,
         };
         if let Some(last) = self.ring[self.newest] {
-            arrived.number = last.number + 1;
-            arrived.is_jump = is_jump(&last, &arrived, tool.max_tool_speed_m_per_s);
+            received.number = last.number + 1;
+            received.is_jump = is_jump(&last, &received, tool.max_tool_speed_m_per_s);
             if source_s.zip(last.source_s).is_some_and(|(now, before)| now < before) {
                 self.forget_source();
             }
         }
         self.newest = (self.newest + 1) % RING;
-        self.ring[self.newest] = Some(arrived);
+        self.ring[self.newest] = Some(received);
         self.clock_offset_s = source_s.map_or(f64::INFINITY, |s| clock_s - s).min(self.clock_offset_s);
         self.sequence = sample.sequence;
         self.source_time_ns = sample.source_time_ns.unwrap_or(0);
@@ -152,13 +152,13 @@ impl PoseTrack {
     /// Pose at `time_s` on the caller's clock, from the two samples around it, and the number of the earlier one; held at
     /// either end of the ring, and before a jump.
     fn interpolate(&self, time_s: f64) -> Option<(Isometry3<f64>, u64)> {
-        let mut after: Option<Arrived> = None;
+        let mut after: Option<ReceivedPose> = None;
         for back in 0..RING {
             let Some(sample) = self.ring[(self.newest + RING - back) % RING] else { break };
             let at_s = self.clock_time_s(&sample);
             if at_s <= time_s {
                 let next = after.filter(|a| !a.is_jump);
-                let share = |next: &Arrived| (time_s - at_s) / (self.clock_time_s(next) - at_s).max(1e-9);
+                let share = |next: &ReceivedPose| (time_s - at_s) / (self.clock_time_s(next) - at_s).max(1e-9);
                 let pose = next.map_or(sample.world_from_tool, |next| {
                     blend(&sample.world_from_tool, &next.world_from_tool, share(&next).clamp(0.0, 1.0))
                 });
@@ -170,7 +170,7 @@ impl PoseTrack {
     }
 
     /// Time of a sample on the caller's clock: its source's time shifted by the smallest latency seen \[s\].
-    fn clock_time_s(&self, sample: &Arrived) -> f64 {
+    fn clock_time_s(&self, sample: &ReceivedPose) -> f64 {
         sample.source_s.map_or(sample.arrival_s, |s| s + self.clock_offset_s)
     }
 }
@@ -184,7 +184,7 @@ pub fn world_from_tool(tool: &ToolDescription, tracker_from_marker: &Isometry3<f
 }
 
 /// Whether the motion between two samples exceeds the speed limit.
-fn is_jump(from: &Arrived, to: &Arrived, max_speed: f64) -> bool {
+fn is_jump(from: &ReceivedPose, to: &ReceivedPose, max_speed: f64) -> bool {
     let distance = (to.world_from_tool.translation.vector - from.world_from_tool.translation.vector).norm();
     let by_source = to.source_s.zip(from.source_s).map_or(0.0, |(to, from)| to - from);
     let elapsed = by_source.max(to.arrival_s - from.arrival_s);

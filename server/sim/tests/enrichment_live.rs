@@ -11,7 +11,7 @@ use nalgebra::{Point3, Vector3};
 use plica_sim::Model;
 use plica_sim::enrichment::*;
 
-static TAUGHT: LazyLock<Vec<Press>> = LazyLock::new(|| presses(32, 1, [[0.02, 0.012], [0.08, 0.048]]));
+static TRAINING_SET: LazyLock<Vec<Press>> = LazyLock::new(|| presses(32, 1, [[0.02, 0.012], [0.08, 0.048]]));
 
 /// A run with enrichment after every tick.
 struct Enriched {
@@ -28,7 +28,7 @@ impl Enriched {
 
     fn with(n_tools: usize, options: EnrichmentOptions) -> Self {
         let model = (1..n_tools).fold(scene(), |scene, _| scene.tool(ball(RADIUS))).run().model;
-        let enricher = Enricher::new(&model, &examples(&TAUGHT), options).unwrap();
+        let enricher = Enricher::new(&model, &examples(&TRAINING_SET), options).unwrap();
         let run = Run::new(model);
         let live = LiveEnrichment::new(&run.model, Arc::new(enricher));
         let skin = vec![[0.0; 3]; run.model.n_skin()];
@@ -242,7 +242,7 @@ fn the_same_twice_is_the_same() {
 #[test]
 fn an_enricher_knows_its_model() {
     let model = scene().run().model;
-    let enricher = Enricher::new(&model, &examples(&TAUGHT), EnrichmentOptions::default()).unwrap();
+    let enricher = Enricher::new(&model, &examples(&TRAINING_SET), EnrichmentOptions::default()).unwrap();
     assert!(enricher.fits(&model));
     let other: Model = common::Scene::block(common::E, 0.45).run().model;
     assert!(!enricher.fits(&other));
@@ -258,7 +258,7 @@ fn every_method_serves_what_it_is_measured_by() {
         it.glide(deep(0.05, 0.03, 0.0), deep(0.05, 0.03, 0.005), 100, |_| ());
         it.live.forget();
         it.tick(&[deep(0.05, 0.03, 0.005)]);
-        let mut bench = Bench::new(&TAUGHT, method.options(axes));
+        let mut bench = Bench::new(&TRAINING_SET, method.options(axes));
         let confidence = bench.enrich(&press_of(&it.run), 1.0);
         let centre = Point3::from(it.run.state.tools()[0].proxy.translation.vector).cast::<f32>();
         let (mut largest, mut worst, mut compared) = (0.0_f64, 0.0_f64, 0);

@@ -1,4 +1,5 @@
-//! Detail never pushes the skin into a tool: what would end up deeper than the coarse skin is moved back to where that is.
+//! Clearance of tools: a vertex that detail would push deeper into a tool than the coarse skin moves back to the coarse
+//! depth.
 
 use plica_geometry::CLUSTER_SIZE;
 

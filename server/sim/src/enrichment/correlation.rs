@@ -1,4 +1,4 @@
-//! Which way of comparing states is used.
+//! Correlation of the present state with the examples, by any of the correlators.
 
 use nalgebra::DMatrix;
 use plica_geometry::ReferenceSkin;
@@ -28,7 +28,7 @@ pub(crate) enum Correlation {
 }
 
 impl Correlation {
-    /// `products` are those of what is to be predicted, `[n][n]`.
+    /// `products` are inner products of the fields to predict, `[n][n]`.
     pub(crate) fn new(
         model: &Model,
         skin: &ReferenceSkin,

@@ -21,10 +21,10 @@ pub(crate) struct Lattice {
     n: usize,
 }
 
-/// A texel beside the next one of its row, as [`Lattice::sample`] reads them.
+/// A texel and the next one of its row, the layout for [`Lattice::sample`].
 pub(crate) type Pair = [f32x4; 2];
 
-/// Puts a texel where samples read it.
+/// Stores a texel in both pairs that hold it.
 #[inline(always)]
 pub(crate) fn put(pairs: &mut [Pair], texel: usize, value: f32x4) {
     pairs[texel][0] = value;
@@ -83,7 +83,7 @@ impl Lattice {
         Vector2::new(coordinate(texel / self.n), coordinate(texel % self.n))
     }
 
-    /// Where a coordinate lies between texels.
+    /// Fractional texel index of a coordinate.
     fn index(&self, x: f64) -> f64 {
         let t = x / self.radius;
         let s = (1.0 + STRETCH) * t / (1.0 + STRETCH * t.abs());
@@ -124,7 +124,7 @@ impl Lattice {
         (second - first).mul_add(f32x4::splat(y), first)
     }
 
-    /// Texels that triangles cover, once a skin is laid out; `None` is what is not reached.
+    /// Texels covered by triangles at chart coordinates `at`; `None` for vertices that the chart does not reach.
     pub(crate) fn cover(&self, skin: &Skin, at: &[Option<Vector2<f64>>]) -> Vec<Covered> {
         let mut covered = Vec::new();
         for triangle in skin.triangles() {

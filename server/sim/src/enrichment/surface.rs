@@ -1,4 +1,4 @@
-//! The skin at rest, as enrichment asks for it: the nearest vertex, the frame at a contact point.
+//! Skin at rest: search for the nearest vertex, frame at a contact point.
 
 use nalgebra::{Point3, Vector3};
 use plica_geometry::{CLUSTER_SIZE, ContactFrame, ReferenceSkin, Skin, SurfacePoint, TriangleIdx, VertexIdx};
@@ -11,16 +11,16 @@ pub(crate) struct Surface {
     reference: ReferenceSkin,
     /// Triangles around each vertex.
     fans: Vec<Vec<TriangleIdx>>,
-    /// Of each cluster of vertices, low and high corner \[m\].
+    /// Low and high corner of each cluster of vertices \[m\].
     boxes: Vec<[Point3<f64>; 2]>,
     rest: Planar,
     normals: Planar,
     axes: [Vector3<f64>; 2],
 }
 
-/// A contact point with its frame on the reference skin.
+/// A contact point on the reference skin, with its frame.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Place {
+pub(crate) struct FramedPoint {
     pub(crate) point: SurfacePoint,
     pub(crate) corners: [VertexIdx; 3],
     pub(crate) frame: ContactFrame,
@@ -74,15 +74,15 @@ impl Surface {
     }
 
     /// The point of the skin next to a contact point: among the triangles around the nearest vertex.
-    pub(crate) fn place(&self, contact_point: &Point3<f64>) -> Place {
+    pub(crate) fn framed_point(&self, contact_point: &Point3<f64>) -> FramedPoint {
         let vertex = self.nearest(contact_point);
         let point = self.reference.nearest_around(contact_point, &self.fans[vertex]);
         let point = point.unwrap_or_else(|| unreachable!("every vertex of a skin has triangles"));
         let corners = self.reference.skin().triangles()[point.triangle.index()];
-        Place { corners, frame: self.reference.frame(&point, &self.axes), point }
+        FramedPoint { corners, frame: self.reference.frame(&point, &self.axes), point }
     }
 
-    /// The vertex nearest to a point: clusters whose boxes are farther away than what is known are passed over.
+    /// The vertex nearest to a point; skips clusters whose boxes are farther away than the best vertex so far.
     pub(crate) fn nearest(&self, p: &Point3<f64>) -> usize {
         let squared = |[low, high]: &[Point3<f64>; 2]| (p - p.sup(low).inf(high)).norm_squared();
         let first = (0..self.boxes.len()).min_by(|a, b| squared(&self.boxes[*a]).total_cmp(&squared(&self.boxes[*b])));
