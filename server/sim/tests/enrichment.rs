@@ -18,7 +18,7 @@ fn default() -> EnrichmentOptions {
     EnrichmentOptions::default()
 }
 
-/// Nothing is lost in storage.
+/// Lossless storage.
 fn exact(interpolator: Interpolator, control_variate: bool) -> EnrichmentOptions {
     let field =
         FieldOptions { interpolator, control_variate, modes: usize::MAX, precision: Precision::F32, ..default().field };
@@ -81,7 +81,7 @@ fn a_stamp_reproduces_its_example_as_its_texels_allow() {
         let error = |i: usize| {
             bench.reproduce(&TRAINING_SET, i);
             let mut misses = bench.misses(&TRAINING_SET[i]);
-            // The top: there the projection has a chart, too.
+            // The top, where the projection has a chart too.
             let centre = TRAINING_SET[i].touch.contact_point;
             for (miss, p) in misses.iter_mut().zip(&positions) {
                 let is_in_chart = (p - centre).norm() < radius && (p.z - common::top(p.x)).abs() < 1e-6;
@@ -126,7 +126,7 @@ fn correlation_of_the_paper_as_printed_keeps_opposing_examples() {
     let printed = median_error(&mut bench, &HELD_OUT);
     println!("on 1 - r {as_read:.3}, on r as printed {printed:.3}");
     assert!(as_read < 0.8 && printed > 1.0, "{as_read} {printed}");
-    // The state that is an example is not recognised: its detail comes from what is least like it.
+    // An example's own state is not recognised: its detail comes from the least similar examples.
     bench.enrich(&TRAINING_SET[0], 1.0);
     assert!(bench.relative_error(&TRAINING_SET[0]) > 0.9);
 }
@@ -149,7 +149,7 @@ fn without_deformation_there_is_no_detail() {
         let mut bench = Bench::new(&TRAINING_SET, EnrichmentOptions { correlator, ..default() });
         bench.enrich(&HELD_OUT[0], 0.0);
         let most = bench.detail.iter().map(|d| size(d)).fold(0.0, f64::max);
-        // The position of the tool knows nothing of the deformation: that is what is wrong with it.
+        // The position of the tool carries no information on the deformation: the weakness of the method.
         assert_eq!(most == 0.0, name != "rbf", "{name}: {most}");
         bench.enrich(&HELD_OUT[0], 1e-6);
         assert!(bench.detail.iter().flatten().all(|c| c.is_finite()), "{name}");

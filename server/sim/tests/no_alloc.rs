@@ -1,4 +1,4 @@
-//! Nothing is allocated or freed in a tick, whatever happens in it.
+//! No tick allocates or frees, in any situation.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod common;
@@ -77,7 +77,7 @@ fn pose(k: usize, n: usize) -> Isometry3<f64> {
     turned(p, Vector3::new(0.1 * t.sin(), 0.2, 0.0))
 }
 
-/// Half of the coarse offset taken back, in a dozen states of the crowd.
+/// Half of the coarse offset removed, in a dozen states with many tools.
 fn enrichment(run: &Run) -> LiveEnrichment {
     let mut trained = crowded(false);
     let mut examples = Examples::default();

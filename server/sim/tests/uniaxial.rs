@@ -1,4 +1,4 @@
-//! The material law that the corotated kernels amount to in a pulled or pressed bar: `P = E (lambda - 1)`,
+//! Effective material law of the corotated kernels in a bar under tension or compression: `P = E (lambda - 1)`,
 //! `J = lambda (1 - nu (lambda - 1))^2`.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
@@ -45,7 +45,7 @@ fn on_face(model: &Model, forces: &[Vector3<f64>], axis: usize) -> Vector3<f64> 
     nodes.iter().zip(forces).filter(|(x, _)| x[axis] > BAR_M[axis] - 1e-9).map(|(_, f)| *f).sum()
 }
 
-/// The lateral stretch at which the lateral faces pull with nothing, by the secant rule.
+/// Lateral stretch at which the lateral faces are free of traction, by the secant method.
 fn free_lateral_stretch(model: &Model, lambda: f64, rotation: &Rotation3<f64>) -> f64 {
     let pull = |s: f64| on_face(model, &forces(model, BarStretch { axial: lambda, lateral: s }, rotation), 1).y;
     let (mut a, mut b) = (1.0, 1.0 - 0.4 * (lambda - 1.0));
