@@ -5,7 +5,7 @@ use plica_geometry::NodeIdx;
 
 use crate::hessian::Hessian;
 
-/// Which second derivatives an energy hands out.
+/// Projection of second derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Projection {
     /// The second derivatives as they are.
@@ -17,9 +17,9 @@ pub enum Projection {
 /// A potential energy of nodal positions, `x: [n_nodes]` \[m\]; value in \[J\], gradient in \[N\], Hessian in \[N/m\].
 ///
 /// The gradient is the derivative of the value and the Hessian that of the gradient; a shared harness checks both by finite
-/// differences. Loads that have no potential say so by [`Energy::has_potential`].
+/// differences. [`Energy::has_potential`] is false for loads without a potential.
 pub trait Energy {
-    /// Calls `visit` with the nodes of every stencil: those whose second derivatives may couple, whatever `x` is.
+    /// Calls `visit` with the nodes of every stencil, the nodes whose second derivatives may couple for some `x`.
     fn visit_stencils(&self, visit: &mut dyn FnMut(&[NodeIdx]));
 
     /// The energy \[J\]; infinite where `x` is not admissible (an inverted element of a material that forbids it).
@@ -38,7 +38,7 @@ pub trait Energy {
     }
 
     /// Adds `(D - H) v` \[N\] for `v: [n_nodes]` \[m\], of loads without a potential: `D` is the derivative of the gradient,
-    /// `H` what [`Energy::add_hessian`] adds under the same `projection`.
+    /// `H` the matrix of [`Energy::add_hessian`] under the same `projection`.
     fn add_remainder_product(
         &self,
         _x: &[Vector3<f64>],
@@ -53,7 +53,7 @@ pub trait Energy {
         None
     }
 
-    /// Where all nodes are at rest \[m\], for energies that know: the solver orders its unknowns by it.
+    /// Rest positions of all nodes \[m\], for energies that have them: the solver orders its unknowns by them.
     fn rest_positions(&self) -> Option<&[Vector3<f64>]> {
         None
     }

@@ -36,7 +36,7 @@ pub struct FactorError {
 pub(crate) struct Indefinite;
 
 impl Factor {
-    /// Analyses the pattern of `hessian`; `rest_positions` of all nodes \[m\], where known, help to order the unknowns.
+    /// Analyses the pattern of `hessian`; `rest_positions` of all nodes \[m\], if known, serve to order the unknowns.
     pub(crate) fn new(hessian: &Hessian, rest_positions: Option<&[Vector3<f64>]>) -> Result<Self, FactorError> {
         let n = hessian.n_unknowns();
         let (starts, rows) = hessian.scalar_pattern();
@@ -72,7 +72,7 @@ impl Factor {
             .map_err(|_| Indefinite)
     }
 
-    /// `H^-1 right_hand_side` for vectors at the nodes; 0 at nodes that are given altogether.
+    /// `H^-1 right_hand_side` for vectors at the nodes; 0 at nodes with all coordinates given.
     pub(crate) fn solve(&mut self, hessian: &Hessian, right_hand_side: &[Vector3<f64>], out: &mut [Vector3<f64>]) {
         for (block, values) in self.solution.chunks_exact_mut(3).enumerate() {
             values.copy_from_slice(right_hand_side[hessian.node_of_block(block)].as_slice());

@@ -14,7 +14,7 @@ pub(crate) type VisitStencils<'a> = dyn Fn(&mut dyn FnMut(&[NodeIdx])) + 'a;
 /// identity; their contribution to the right-hand side, `-H_free,given dx_given`, is in `lift`.
 #[derive(Debug, Clone)]
 pub struct Hessian {
-    /// Block row and column of each node; `u32::MAX` for nodes that are given altogether.
+    /// Block row and column of each node; `u32::MAX` for nodes with all coordinates given.
     block_of_node: Vec<u32>,
     node_of_block: Vec<u32>,
     is_given: Vec<[bool; 3]>,
@@ -25,7 +25,7 @@ pub struct Hessian {
     /// Start of the values of scalar column `3 b` for each block column `b`.
     value_starts: Vec<usize>,
     values: Vec<f64>,
-    /// How far each node's given coordinates move in this step \[m\].
+    /// Motion of each node's given coordinates in this step \[m\].
     given_motion: Vec<Vector3<f64>>,
     /// `-H_free,given dx_given`, `[n_nodes]` \[N\].
     lift: Vec<Vector3<f64>>,
@@ -87,8 +87,8 @@ impl Hessian {
         product
     }
 
-    /// Adds the second derivatives of one stencil: `block(a, b)` couples `nodes[a]` and `nodes[b]` and is asked for once per
-    /// unordered pair; `block(b, a)` is its transpose.
+    /// Adds the second derivatives of one stencil: `block(a, b)` couples `nodes[a]` and `nodes[b]` and is called once
+    /// per unordered pair; `block(b, a)` is its transpose.
     ///
     /// # Panics
     /// If a pair of nodes is not in the pattern: its energy did not name it in `visit_stencils`.
@@ -120,7 +120,7 @@ impl Hessian {
         if i >= j { self.add_lower(i, j, block) } else { self.add_lower(j, i, &block.transpose()) }
     }
 
-    /// Sets all values to 0 and states how far given coordinates move in this step \[m\], `[n_nodes]`.
+    /// Sets all values to 0, and the motion of given coordinates in this step \[m\], `[n_nodes]`.
     pub(crate) fn clear(&mut self, given_motion: Option<&[Vector3<f64>]>) {
         self.values.fill(0.0);
         self.lift.fill(Vector3::zeros());
@@ -178,7 +178,7 @@ impl Hessian {
         &self.lift
     }
 
-    /// For every block the others coupled with it.
+    /// Blocks coupled with each block.
     pub(crate) fn block_neighbours(&self) -> Vec<Vec<u32>> {
         let mut neighbours = vec![Vec::new(); self.n_blocks()];
         for column in 0..self.n_blocks() {
@@ -219,7 +219,7 @@ impl Hessian {
         self.column_start(block, k)
     }
 
-    /// Block at a place of a block column; the diagonal one filled up from its lower triangle.
+    /// Block at an entry of a block column; the diagonal block is completed from its lower triangle.
     fn block(&self, column: usize, place: usize) -> Matrix3<f64> {
         let value = |r: usize, k: usize| self.values[self.column_start(column, k) + 3 * place - k + r];
         if place == 0 { Matrix3::from_fn(|r, k| value(r.max(k), r.min(k))) } else { Matrix3::from_fn(value) }

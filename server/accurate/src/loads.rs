@@ -48,7 +48,7 @@ impl Energy for NodalForces {
     fn add_hessian(&self, _x: &[Vector3<f64>], _projection: Projection, _hessian: &mut Hessian) {}
 }
 
-/// A dead traction on faces: force per rest area, whatever becomes of the surface.
+/// A dead traction on faces: force per rest area, independent of the deformation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Traction {
     nodal: NodalForces,

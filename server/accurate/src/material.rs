@@ -19,7 +19,7 @@ pub(crate) use deformation::Deformation;
 pub(crate) use tangent::Tangent;
 pub(crate) use volumetric::Volumetric;
 
-/// Which law.
+/// Material law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum MaterialModel {
     /// `mu eps : eps + lambda/2 tr(eps)^2` with the small strain `eps = sym(F) - I`. Not invariant under rotations.
@@ -34,7 +34,7 @@ pub enum MaterialModel {
 /// An isotropic elastic material.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Material {
-    /// Which law.
+    /// Material law.
     pub model: MaterialModel,
     /// Young's modulus at rest \[Pa\], positive.
     pub young_modulus_pa: f64,
@@ -51,7 +51,7 @@ pub struct Lame {
     pub mu_pa: f64,
 }
 
-/// Numbers that make no material.
+/// Error of material parameters.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum MaterialError {
     /// Young's modulus is not positive and finite.
@@ -84,7 +84,7 @@ impl Material {
         Lame { lambda_pa: 2.0 * mu_pa * nu / (1.0 - 2.0 * nu), mu_pa }
     }
 
-    /// Whether the numbers make a material with a positive definite stiffness at rest.
+    /// Checks that the stiffness at rest is positive definite.
     ///
     /// # Errors
     /// See [`MaterialError`].

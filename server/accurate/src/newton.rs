@@ -143,7 +143,7 @@ impl Solver {
         self.find_residual(&Problem { energies, constraints, params }, x).relative
     }
 
-    /// One Newton step. While given coordinates still move, the free ones follow linearly whatever the energy says.
+    /// One Newton step. While given coordinates still move, the free ones follow linearly, regardless of the energy.
     fn step(
         &mut self,
         problem: &Problem<'_>,

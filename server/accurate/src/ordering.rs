@@ -4,14 +4,15 @@ use nalgebra::Vector3;
 
 /// Parts of at most this many nodes are not divided further.
 const MAX_LEAF: usize = 16;
-/// Where along each axis a part may be cut, as shares of its nodes.
+/// Candidate cuts along each axis, as shares of the nodes.
 const CUTS: [f64; 5] = [0.4, 0.45, 0.5, 0.55, 0.6];
 
-/// Nodes in the order of their elimination. `positions` \[m\] are theirs, `neighbours[n]` the nodes coupled with `n`.
+/// Nodes in the order of their elimination, given their `positions` \[m\] and, as `neighbours[n]`, the nodes coupled
+/// with `n`.
 ///
 /// A part is cut by a plane across an axis; nodes on one side with neighbours on the other are the separator. They come last,
-/// after the halves that they separate, so that eliminating one half fills nothing in the other. Of several planes the one
-/// with the smallest separator is taken, weighted by how unequal the halves are.
+/// after the halves that they separate, so that eliminating one half fills nothing in the other. Of several planes the
+/// one with the smallest separator is taken, weighted by the imbalance of the halves.
 pub(crate) fn nested_dissection(positions: &[Vector3<f64>], neighbours: &[Vec<u32>]) -> Vec<usize> {
     let n = positions.len();
     let mut dissection =

@@ -36,10 +36,10 @@ pub struct Solid {
     elements: Vec<Element>,
 }
 
-/// Why a mesh and materials make no solid.
+/// Error of a solid's mesh and materials.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SolidError {
-    /// Not one material per hexahedron.
+    /// The number of materials is not that of the hexahedra.
     #[error("{n_materials} materials for {n_hexes} hexahedra")]
     Count {
         /// Materials given.

@@ -6,7 +6,7 @@ use plica_geometry::{Embedding, NodeIdx, VertexIdx};
 use crate::energy::{Energy, Projection};
 use crate::hessian::Hessian;
 
-/// Version of the tie's definition: solutions depend on it, so databases name it.
+/// Version of the tie's definition: solutions depend on it, so databases record it.
 pub const TIE_VERSION: u32 = 1;
 
 /// Stiffness of a tie.
@@ -14,7 +14,7 @@ pub const TIE_VERSION: u32 = 1;
 pub struct TieOptions {
     /// Young's modulus of the tied material \[Pa\].
     pub young_modulus_pa: f64,
-    /// `l` \[m\]: a pressure of `E` stretches the tie by this much.
+    /// `l` \[m\]: stretch of the tie under a pressure of `E`.
     pub compliance_m: f64,
     /// Gap at which a vertex leaves the tie \[m\].
     pub band_m: f64,
@@ -30,8 +30,8 @@ impl TieOptions {
 
     /// Share of the full stiffness at a gap \[m\]: 1 in contact, then falling by equal factors over equal distances,
     /// `rim_floor^(gap/band)`, and 0 from `band_m` on. Equal steps of the logarithm, because the surface follows a vertex
-    /// as long as the tie is stiffer than the material: a share that falls linearly keeps nearly all of the rim hard and
-    /// lets go at once.
+    /// as long as the tie is stiffer than the material: a linear fall would keep nearly all of the rim stiff and then
+    /// release it abruptly.
     pub fn share(&self, gap_m: f64) -> f64 {
         if gap_m >= self.band_m {
             0.0
@@ -50,7 +50,7 @@ pub struct TieTarget {
     pub vertex: VertexIdx,
     /// Its gap to the tool \[m\], negative inside.
     pub gap_m: f64,
-    /// Area that belongs to it at rest \[m^2\].
+    /// Its area at rest \[m^2\].
     pub area_m2: f64,
     /// Its position on the coarse imprint, `s_v` \[m\].
     pub position: Vector3<f64>,
@@ -58,8 +58,8 @@ pub struct TieTarget {
 
 /// `W = 1/2 sum_v k_v |A_v x - s_v|^2`, `k_v = E/l area_v share(gap_v)`: `A x = s` in the sense of weighted least squares.
 ///
-/// (As hard conditions these rows would be linearly dependent: more vertices than nodes.) Stiffness is counted per area, so
-/// that the answer does not change with the density of the vertices.
+/// (As hard conditions these rows would be linearly dependent: more vertices than nodes.) Stiffness is counted per
+/// area, so that the solution does not depend on the density of the vertices.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tie {
     rows: Vec<Row>,
@@ -74,7 +74,8 @@ struct Row {
 }
 
 impl Tie {
-    /// Ties rows of `embedding` \[of the accurate mesh\] to `targets`; those beyond the band are left out. With trilinear
+    /// Ties rows of `embedding` \[of the accurate mesh\] to `targets`; targets beyond the band are left out. With
+    /// trilinear
     /// rows every stencil lies within one hexahedron, so that a [`crate::Solver`] of the solid serves any tie.
     ///
     /// # Panics

@@ -1,4 +1,5 @@
-//! Problems with published answers: a cantilever bent far, Cook's membrane, a nearly incompressible block pressed in part.
+//! Problems with published solutions: a cantilever bent far, Cook's membrane, a nearly incompressible block pressed in
+//! part.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod common;

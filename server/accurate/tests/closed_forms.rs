@@ -14,7 +14,7 @@ fn mesh() -> HexMesh {
     distorted_block(SIZE, [2, 2, 2], 0.3, 7)
 }
 
-/// Principal nominal stress \[Pa\] along `axis` for the principal stretches `s`, as textbooks have it.
+/// Principal nominal stress \[Pa\] along `axis` for the principal stretches `s`, in textbook form.
 fn nominal_stress(material: &Material, s: [f64; 3], axis: usize) -> f64 {
     let (e, nu) = (material.young_modulus_pa, material.poisson_ratio);
     let (lambda, mu) = (e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu)));

@@ -41,7 +41,7 @@ fn pressures() {
         let mut scene = scene(n as u64);
         let pose = Isometry3::new(Vector3::new(0.008, 0.003, 4e-3), scene.random.vector(0.5));
         let n_points = scene.surface.points().len();
-        // Some push although there is a gap, some do not although they are inside.
+        // Some push across a gap, some are inside without pushing.
         let multipliers: Vec<f64> = (0..n_points).map(|_| scene.random.within(2e5)).collect();
         let penalties = vec![PENALTY; n_points];
         let contact = NormalContact {

@@ -1,6 +1,6 @@
 //! A ball on a half-space and on a bonded layer, against Hertz and against the correction for the layer's thickness.
 //!
-//! A quarter model: symmetry planes x = 0 and y = 0, small cells where the ball touches, which grow away from there.
+//! A quarter model: symmetry planes x = 0 and y = 0, small cells in the contact region, growing away from it.
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
@@ -119,7 +119,7 @@ fn small_depths_follow_hertz_finer() {
     hertz(16, 14);
 }
 
-/// Ratios of the force to what the correction says.
+/// Ratios of the force to the corrected one.
 fn bonded_layer(n_fine: usize, n_growing: usize, n_down: usize) -> Vec<f64> {
     let (height_m, poisson_ratio) = (0.01, 0.499);
     let mut ratios = Vec::new();

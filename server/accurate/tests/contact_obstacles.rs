@@ -49,7 +49,7 @@ fn normals_and_curvatures_are_derivatives() {
             let central = |axis: usize| (at(axis, 1.0), at(axis, -1.0));
             let slopes = |axis: usize| (central(axis).0.distance_m - central(axis).1.distance_m) / (2.0 * STEP_M);
             let turns = |axis: usize| (central(axis).0.normal - central(axis).1.normal) / (2.0 * STEP_M);
-            // Where the nearest face or part changes within the step there is no derivative.
+            // No derivative where the nearest face or part changes within the step.
             let changes = (0..3).any(|axis| (turns(axis) * STEP_M).norm() > 1e-3);
             if changes {
                 continue;
@@ -82,7 +82,7 @@ fn shapes_lie_as_those_of_the_simulation() {
     assert_eq!(distance(&Obstacle::Union(Vec::new()), 0.0, 0.0, 0.0), f64::INFINITY);
 }
 
-/// On a centre or an axis there is no direction; any will do that is one.
+/// On a centre or an axis the normal is any unit vector.
 #[test]
 fn centres_have_a_normal() {
     for (name, obstacle) in shapes() {

@@ -1,4 +1,4 @@
-//! Presses against a soft block: contact pushes only, balances the supports, keeps Coulomb's law, and ends where it should.
+//! Presses against a soft block: contact only pushes, balances the supports, obeys Coulomb's law, and ends on release.
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
@@ -20,7 +20,7 @@ fn over(lowest_m: f64, height_m: f64, along_m: f64) -> Isometry3<f64> {
     at(MIDDLE_M[0] + along_m, MIDDLE_M[1], height_m + lowest_m)
 }
 
-/// Tools and how far below their origin they reach \[m\].
+/// Tools and their extent below the origin \[m\].
 fn tools(friction: f64) -> Vec<(&'static str, Tool, f64)> {
     let cuboid = [8e-3, 6e-3, 5e-3];
     let tip = [[0.0, 0.0, -9e-3], [9e-3, 0.0, 2e-3], [-6e-3, 8e-3, 2e-3], [-6e-3, -8e-3, 2e-3]].map(Into::into);
@@ -46,7 +46,7 @@ fn pressed(body: &mut Body, tool: &Tool, lowest_m: f64, depth_m: f64, drag_m: f6
 }
 
 /// Every shape, with friction: forces balance, points stay outside to within a small part of a face, tractions stay within
-/// the bound, and after the tool has left the body is as it was.
+/// the bound, and the body returns to its shape after release.
 #[test]
 fn shapes_press_and_leave() {
     let mut body = soft_block([12, 12, 6]);
@@ -125,8 +125,8 @@ fn a_plate_slides_under_mu_n() {
     assert!((ratios[4] - 0.3).abs() < 1e-3 * 0.3, "{}", ratios[4]);
 }
 
-/// A tool that rests, twenty times solved for again, keeps its force and the body its shape: neither what sticks nor what
-/// has slid creeps. A small drag there and back brings the force back.
+/// Twenty repeated solves with a tool at rest keep force and shape: neither sticking nor slid points creep. A small
+/// drag there and back brings the force back.
 #[test]
 fn what_sticks_does_not_creep() {
     let mut body = soft_block([12, 12, 6]);
@@ -149,7 +149,7 @@ fn what_sticks_does_not_creep() {
     }
 }
 
-/// A ball on the middle of a square block: no force sideways, and the four corners of anything move alike.
+/// A ball on the middle of a square block: no lateral force, and symmetric points move alike.
 #[test]
 fn a_symmetric_press_is_symmetric() {
     let mut body = soft_block([10, 10, 5]);
@@ -171,7 +171,7 @@ fn a_symmetric_press_is_symmetric() {
     assert!(asymmetry_m < 1e-8, "{asymmetry_m:e} m");
 }
 
-/// Without friction the way does not matter; with it, shorter increments settle to one result.
+/// Without friction the result is independent of the path; with friction, shorter increments converge.
 #[test]
 fn results_depend_little_on_increments() {
     let mut body = soft_block([10, 10, 5]);
@@ -207,7 +207,7 @@ fn presses_repeat() {
     assert_eq!(first, second);
 }
 
-/// An increment that takes too many Newton steps is halved, and the press arrives where it does without.
+/// An increment that takes too many Newton steps is halved, and the press reaches the same result.
 #[test]
 fn failed_increments_are_halved() {
     let mut body = soft_block([8, 8, 4]);
@@ -229,8 +229,8 @@ fn failed_increments_are_halved() {
     println!("{error}");
 }
 
-/// A cancelled press leaves the last increment that was solved, from where it can be taken up again. With friction the
-/// result is not quite the same: the solve starts elsewhere, and solutions of Coulomb's law are not unique.
+/// A cancelled press leaves the last solved increment, from which it can continue. With friction the result differs
+/// slightly: the solve starts elsewhere, and solutions of Coulomb's law are not unique.
 #[test]
 fn presses_can_be_cancelled_and_taken_up() {
     let mut body = soft_block([8, 8, 4]);
@@ -254,7 +254,7 @@ fn presses_can_be_cancelled_and_taken_up() {
     }
 }
 
-/// Moving through free air costs nothing.
+/// Motion through free air takes no iterations.
 #[test]
 fn free_air_is_free() {
     let mut body = soft_block([8, 8, 4]);

@@ -1,4 +1,4 @@
-//! How results depend on increments and on the mesh, and what presses cost. The sweeps over the wedge take minutes:
+//! Dependence of results on increments and mesh, and cost of presses. The sweeps over the wedge take minutes:
 //! `cargo test --release -p plica-accurate --test contact_sweep -- --ignored --nocapture`.
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
@@ -54,7 +54,7 @@ fn tool(friction: f64, max_increment_m: f64) -> Tool {
     Tool { params: ContactParams::new(YOUNG_MODULUS_PA, max_increment_m), ..Tool::capsule(friction) }
 }
 
-/// From touch, `share` of the local height down, then `drag` aside.
+/// From first contact, `share` of the local height down, then `drag` sideways.
 fn path(x: f64, y: f64, share: f64, drag: Vector3<f64>) -> Vec<Isometry3<f64>> {
     let height_m = Wedge::default().height_m(x);
     let touch = at(x, y, height_m + RADIUS_M);
@@ -91,7 +91,7 @@ fn rms_mm(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
     (sum / a.len() as f64).sqrt() * 1e3
 }
 
-/// Twenty-four states of the wedge, drawn as its examples are: all must be found, in fewer than 40 factorisations a state.
+/// Twenty-four states of the wedge, drawn like its examples: all are solved, in fewer than 40 factorisations a state.
 #[test]
 #[ignore = "minutes"]
 fn states_of_the_wedge() {

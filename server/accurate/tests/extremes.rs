@@ -12,7 +12,7 @@ use plica_geometry::shapes::block;
 
 const SIZE: [f64; 3] = [0.02, 0.02, 0.02];
 
-/// Maps of rank 2, 1, 0 and turned over.
+/// Maps of rank 2, 1, 0 and with negative determinant.
 fn collapses() -> [Matrix3<f64>; 6] {
     [
         Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 0.0)),
@@ -69,7 +69,7 @@ fn material_at(f: &Matrix3<f64>) -> f64 {
     lame.mu_pa / 2.0 * (i_c - 3.0) - lame.mu_pa * j.ln() + lame.lambda_pa / 4.0 * (j * j - 1.0 - 2.0 * j.ln())
 }
 
-/// A dead pressure of several moduli: the first Newton step would turn the block over.
+/// A dead pressure of several moduli: the first Newton step would invert the block.
 #[test]
 fn line_search_recovers_from_steps_that_would_invert() {
     let mesh = block(SIZE, [2, 2, 2]);
@@ -94,7 +94,7 @@ fn line_search_recovers_from_steps_that_would_invert() {
         let mut x = rest(&mesh);
         let result = solve(&[&solid, &load], &constraints, &Params::default(), &mut x);
         if model == MaterialModel::StableNeoHookean {
-            // This law is too soft to hold it: it settles upside down, which the caller sees by its smallest J.
+            // This law is too soft: the block settles inverted, visible in its smallest J.
             assert!(result.unwrap().smallest_jacobian.unwrap() < 0.05);
             continue;
         }
@@ -110,7 +110,7 @@ fn line_search_recovers_from_steps_that_would_invert() {
     }
 }
 
-/// Inner nodes anywhere at all: the stable material finds back to rest.
+/// Inner nodes at random positions: the stable material returns to rest.
 #[test]
 fn stable_neo_hookean_recovers_from_inversion() {
     let mesh = block(SIZE, [4, 4, 4]);

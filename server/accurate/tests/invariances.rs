@@ -1,4 +1,4 @@
-//! What every element must satisfy: no force at rest or after a rigid motion, the patch test, volume and stress of affine
+//! Invariances of every element: no force at rest or after a rigid motion, the patch test, volume and stress of affine
 //! deformations.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 

@@ -1,4 +1,4 @@
-//! What a solve reports, how it is cancelled and how it fails.
+//! Reports, cancellation and failures of a solve.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod common;
@@ -17,7 +17,7 @@ use plica_geometry::{HexMesh, NodeIdx};
 
 const SIZE: [f64; 3] = [0.08, 0.02, 0.02];
 
-/// A beam, its mesh and what holds it at x = 0.
+/// A beam, its mesh and its supports at x = 0.
 struct Beam {
     mesh: HexMesh,
     solid: Solid,
@@ -110,7 +110,7 @@ fn nodal_forces_are_a_traction_put_together_by_hand() {
     assert!(distance(&by_traction, &by_forces) <= 1e-9 * SIZE[0]);
 }
 
-/// A pull on the end that turns with it: at 3 kPa eight times the force that buckles the beam.
+/// A tensile traction that turns with the end: at 3 kPa eight times the buckling force.
 #[test]
 fn follower_pressure_converges_on_a_bent_beam() {
     let beam = Beam::new();
@@ -172,7 +172,7 @@ fn a_body_that_nothing_holds_is_an_error() {
     assert!(result.is_err(), "{result:?}");
 }
 
-/// Supports that move as a rigid body take the solid along without force, although all that is left is rounding.
+/// Supports that move as a rigid body move the solid without force, up to rounding.
 #[test]
 fn rigid_motion_of_the_supports_is_no_load() {
     let beam = Beam::new();
@@ -209,8 +209,8 @@ fn prescribed_displacements_arrive_exactly() {
     }
 }
 
-/// The top of a cube sinks by 70 % while it turns by 100 degrees. Going there at once would turn elements over, which costs
-/// the compressible material an infinite energy: it stops on the way and goes on from there.
+/// The top of a cube sinks by 70 % while it turns by 100 degrees. A single step would invert elements, at infinite
+/// energy in the compressible material: the solve stops on the way and continues from there.
 #[test]
 fn given_coordinates_stop_where_the_energy_would_be_infinite() {
     let size = [0.02; 3];
@@ -253,7 +253,7 @@ fn a_solver_serves_one_load_after_another_with_the_same_bits() {
     assert_eq!(results[0].0, beam.solve(&loads[0], &Params::default()).1, "as by a fresh solver");
 }
 
-/// Whoever solves many problems at once moves solvers to threads and shares the solid.
+/// For problems in parallel, solvers move to threads and share the solid.
 #[test]
 fn solvers_may_move_between_threads() {
     fn is_send<T: Send>() {}

@@ -1,4 +1,4 @@
-//! The tie to a coarse imprint: what its numbers mean, and that it lets go of a vertex gently.
+//! Tie to a coarse imprint: meaning of its parameters, smooth release of vertices.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod common;
@@ -87,7 +87,7 @@ fn share_falls_by_equal_factors() {
     assert_close(options.share(options.band_m * (1.0 - 1e-9)), options.rim_floor, 1e-6, "at the rim");
 }
 
-/// Whoever changes the numbers below changes every database: raise the version too.
+/// A change of the numbers below changes every database: raise the version too.
 #[test]
 fn version_1_is_this() {
     let options = TieOptions::for_modulus(E);

@@ -1,8 +1,8 @@
-//! A tree of axis-aligned boxes: which boxes are near a point, without asking all of them.
+//! Tree of axis-aligned boxes: finds the boxes near a point without a test of each.
 
 use nalgebra::Point3;
 
-/// Boxes in a leaf at most.
+/// Largest number of boxes in a leaf.
 const LEAF_SIZE: usize = 4;
 
 /// An axis-aligned box \[m\].
@@ -42,7 +42,7 @@ impl Aabb {
 #[derive(Clone, Debug)]
 pub(crate) struct BoxTree {
     boxes: Vec<Aabb>,
-    /// Boxes by number, so that every branch holds a contiguous run of them.
+    /// Indices of the boxes, ordered so that every branch holds a contiguous run.
     order: Vec<u32>,
     branches: Vec<Branch>,
 }
@@ -50,14 +50,14 @@ pub(crate) struct BoxTree {
 #[derive(Clone, Debug)]
 struct Branch {
     bounds: Aabb,
-    /// Where its run of `order` starts and ends.
+    /// Range of its run in `order`.
     run: [usize; 2],
     /// Branches of the two halves; none in a leaf.
     halves: Option<[usize; 2]>,
 }
 
 impl BoxTree {
-    /// The tree of `boxes`, which are known by their position in this list.
+    /// Tree over `boxes`, each identified by its position in the slice.
     pub(crate) fn new(boxes: Vec<Aabb>) -> Self {
         let order = (0..boxes.len() as u32).collect();
         let mut tree = Self { boxes, order, branches: Vec::new() };
@@ -67,7 +67,7 @@ impl BoxTree {
         tree
     }
 
-    /// The boxes within `distance_m` of `x`, with their distance \[m\], in increasing order of number.
+    /// Boxes within `distance_m` of `x`, with their distance \[m\], in increasing order of number.
     pub(crate) fn within(&self, x: &Point3<f64>, distance_m: f64) -> Vec<(usize, f64)> {
         let mut found = Vec::new();
         let mut waiting: Vec<usize> = (!self.branches.is_empty()).then_some(0).into_iter().collect();
@@ -90,7 +90,7 @@ impl BoxTree {
         numbers.map(|number| (number, self.boxes[number].distance(x))).filter(move |&(_, distance)| distance <= reach)
     }
 
-    /// Makes the branch of a run and those below it; its number.
+    /// Adds the branch of a run and the branches below it; returns its index.
     fn grow(&mut self, start: usize, end: usize) -> usize {
         let bounds = self.bounds_of(start, end);
         let branch = self.branches.len();
@@ -107,7 +107,7 @@ impl BoxTree {
         self.order[start..end].iter().fold(first, |bounds, &number| bounds.joined(&self.boxes[number as usize]))
     }
 
-    /// Orders a run so that both halves lie apart along the longest side of its centres; where the second starts.
+    /// Partitions a run at the median along the longest side of its centres; returns the start of the second half.
     fn split(&mut self, start: usize, end: usize) -> usize {
         let boxes = &self.boxes;
         let centre = |number: u32| boxes[number as usize].centre();

@@ -9,7 +9,7 @@ use crate::skin::Skin;
 /// shorter.
 pub const CLUSTER_SIZE: usize = 64;
 
-/// What a unit normal is worth beside positions, in cluster widths. On the wedge: from 0 to 1.5 the node lists stay
+/// Weight of a unit normal against positions, in cluster widths. On the wedge: from 0 to 1.5 the node lists stay
 /// as long (45 nodes) while the clusters that mix top and bottom go from 18 of 108 to 2; beyond, lists grow.
 const NORMAL_IN_CLUSTER_WIDTHS: f64 = 1.5;
 
@@ -20,9 +20,9 @@ impl Skin {
     /// The same surface with its vertices re-ordered so that every run of [`CLUSTER_SIZE`] consecutive vertices is
     /// compact.
     ///
-    /// The vertices are cut in two again and again, always at a multiple of the cluster size, where the spread within
-    /// both parts is least. Spread is measured over positions and normals together, a unit normal being worth 1.5
-    /// cluster widths: faces that look away from each other part company even where they lie close.
+    /// The vertices are bisected recursively, at the multiple of the cluster size with the least spread within both
+    /// parts. Spread is measured over positions and normals together, a unit normal weighing 1.5 cluster widths: faces
+    /// with opposite normals separate even where they lie close.
     pub fn clustered(self) -> Self {
         let features = self.cluster_features();
         let mut order: Vec<VertexIdx> = (0..self.n_vertices()).map(VertexIdx::from_index).collect();

@@ -76,7 +76,7 @@ impl ConvexPolytope {
         Self::hull((0..8).map(corner).collect())
     }
 
-    /// Points as given, with those inside the hull \[m\].
+    /// All given points, inside the hull too \[m\].
     pub fn points(&self) -> &[Point3<f64>] {
         &self.points
     }

@@ -2,7 +2,7 @@
 
 use crate::skin::Skin;
 
-/// A skin as it is published.
+/// Published form of a skin.
 #[derive(Debug, Clone)]
 pub struct DisplaySurface {
     /// Rest positions `[n_skin]` \[m\].

@@ -8,16 +8,16 @@ use crate::isoparametric::shape_functions;
 use crate::locate::{Location, Locator};
 use crate::neighbourhood::Neighbourhoods;
 
-/// Support of moving least squares that is used unless a scene says otherwise, in cells.
+/// Default support of moving least squares, in cells.
 pub const DEFAULT_SUPPORT_CELLS: f64 = 1.75;
 
-/// A point may lie this far outside the mesh, in cells; farther away it is refused.
+/// Largest distance of a point outside the mesh, in cells.
 pub const MAX_OUTSIDE_CELLS: f64 = 0.5;
 
 /// Least ratio of the extreme eigenvalues of the moment matrix; below it a row falls back to trilinear.
 const MIN_RECIPROCAL_CONDITION: f64 = 1e-4;
 
-/// How weights are made.
+/// Kind of weights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EmbeddingKind {
     /// Moving least squares with a linear basis: smooth across element borders, does not pass through the nodes.
@@ -35,7 +35,7 @@ impl Default for EmbeddingKind {
     }
 }
 
-/// Why points cannot be embedded.
+/// Error of embedding points.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EmbeddingError {
     /// A point's coordinate is NaN or infinite.
@@ -56,7 +56,7 @@ pub enum EmbeddingError {
         point: VertexIdx,
         /// Its position \[m\].
         position: [f64; 3],
-        /// How far outside a point may lie \[m\].
+        /// Largest distance outside the mesh \[m\].
         limit_m: f64,
     },
     /// The support is not a positive finite number.
@@ -168,8 +168,8 @@ impl Embedding {
         &self.fallbacks
     }
 
-    /// The nodes that a run of rows needs, in increasing order, for each run of `run_length` rows (the last may be
-    /// shorter): the node list of every skin cluster.
+    /// Nodes with weight in each run of `run_length` rows (the last may be shorter), in increasing order: the node list
+    /// of every skin cluster.
     pub fn node_lists(&self, run_length: usize) -> Vec<Vec<NodeIdx>> {
         let runs = (0..self.n_rows()).step_by(run_length);
         runs.map(|first| {

@@ -1,6 +1,7 @@
 //! Discrete exponential map: geodesic polar coordinates around a vertex of a skin \[MR12\].
 //!
-//! Distance `U` and direction `theta` of the shortest way spread outward in the order of their distance. A vertex `i` behind an
+//! Distance `U` and direction `theta` of shortest paths propagate outward in the order of distance. A vertex `i` behind
+//! an
 //! edge `jk` is reached by unfolding the triangle into the plane of a virtual source with distances `U_j` and `U_k`: exact where
 //! the surface can be unfolded, over sharp edges too.
 
@@ -13,14 +14,15 @@ use nalgebra::{Point3, Vector2};
 use crate::index::VertexIdx;
 use crate::skin::Skin;
 
-/// A new way must be shorter by this share.
+/// A new path is taken if it is shorter than this share of the present one.
 const SHORTER: f64 = 1.0 - 1e-9;
 
 /// Neighbourhoods of a skin, from which maps around its vertices are made.
 #[derive(Debug, Clone)]
 pub struct ExponentialMaps<'a> {
     skin: &'a Skin,
-    /// The other two corners of the triangles around each vertex, counter-clockwise; `starts` says where they begin.
+    /// The other two corners of the triangles around each vertex, counter-clockwise; `starts` holds the first of each
+    /// vertex.
     fans: Vec<[u32; 2]>,
     starts: Vec<u32>,
 }
@@ -29,7 +31,7 @@ pub struct ExponentialMaps<'a> {
 pub type Mapped = (VertexIdx, Vector2<f64>);
 
 impl<'a> ExponentialMaps<'a> {
-    /// Of `skin`.
+    /// Neighbourhoods of `skin`.
     pub fn new(skin: &'a Skin) -> Self {
         let mut fans = vec![Vec::new(); skin.n_vertices()];
         for corners in skin.triangles() {
@@ -46,7 +48,8 @@ impl<'a> ExponentialMaps<'a> {
         Self { skin, fans: fans.concat(), starts }
     }
 
-    /// Vertices within `radius_m` of `source`, nearest first, that can be reached over vertices that pass `admits`. The axis of
+    /// Vertices within `radius_m` of `source`, nearest first, reachable over vertices that `admits` accepts. The axis
+    /// of
     /// the coordinates is some edge at the source; angles grow counter-clockwise seen from outside.
     pub fn around(&self, source: VertexIdx, radius_m: f64, admits: impl Fn(VertexIdx) -> bool) -> Vec<Mapped> {
         let mut front = Front::new(self, source, admits);
@@ -67,6 +70,15 @@ impl<'a> ExponentialMaps<'a> {
     }
 }
 
+/// Geodesic polar coordinates.
+#[derive(Clone, Copy)]
+struct Polar {
+    /// `U` \[m\]
+    distance: f64,
+    /// `theta` \[rad\]
+    angle: f64,
+}
+
 /// Vertices reached so far.
 struct Front<'a, A> {
     maps: &'a ExponentialMaps<'a>,
@@ -75,7 +87,7 @@ struct Front<'a, A> {
     distance: Vec<f64>,
     angle: Vec<f64>,
     is_final: Vec<bool>,
-    /// Distances order like their bits, as they are not negative.
+    /// Keyed by the bits of distances, which order like non-negative floats.
     heap: BinaryHeap<Reverse<(u64, u32)>>,
 }
 
@@ -103,21 +115,21 @@ impl<'a, A: Fn(VertexIdx) -> bool> Front<'a, A> {
         for _ in 0..fan.len() {
             let Some(triangle) = next else { break };
             let v = triangle[0] as usize;
-            this.offer(v, (maps.position(v) - centre).norm(), theta);
+            this.offer(v, Polar { distance: (maps.position(v) - centre).norm(), angle: theta });
             theta += scale * turn(triangle);
             next = fan.iter().find(|f| f[0] == triangle[1]);
         }
         this
     }
 
-    fn offer(&mut self, v: usize, distance: f64, angle: f64) {
+    fn offer(&mut self, v: usize, Polar { distance, angle }: Polar) {
         if distance < self.distance[v] * SHORTER && (self.admits)(VertexIdx::from_index(v)) {
             (self.distance[v], self.angle[v]) = (distance, angle);
             self.heap.push(Reverse((distance.to_bits(), v as u32)));
         }
     }
 
-    /// The next nearest vertex, from which its neighbours are reached.
+    /// Finalises the nearest open vertex and offers paths over it to its neighbours.
     fn advance(&mut self, radius_m: f64) -> Option<usize> {
         let j = loop {
             let Reverse((bits, v)) = self.heap.pop()?;
@@ -132,28 +144,28 @@ impl<'a, A: Fn(VertexIdx) -> bool> Front<'a, A> {
         for &[a, b] in self.maps.fan(j) {
             for (i, k) in [(a as usize, b as usize), (b as usize, a as usize)] {
                 if !self.is_final[i] {
-                    let (distance, angle) = self.way(j, k, i);
-                    self.offer(i, distance, angle);
+                    self.offer(i, self.path(j, k, i));
                 }
             }
         }
         Some(j)
     }
 
-    /// To `i` over the edge `jk` if its shadow from the virtual source holds `i`, else along an edge.
-    fn way(&self, j: usize, k: usize, i: usize) -> (f64, f64) {
+    /// Path to `i`: straight from the virtual source if it crosses the edge `jk`, else along an edge.
+    fn path(&self, j: usize, k: usize, i: usize) -> Polar {
         let [x_j, x_k, x_i] = [j, k, i].map(|v| self.maps.position(v));
-        let along_j = (self.distance[j] + (x_i - x_j).norm(), self.angle[j]);
+        let along_j = Polar { distance: self.distance[j] + (x_i - x_j).norm(), angle: self.angle[j] };
         if k == self.source || !self.distance[k].is_finite() {
             return along_j;
         }
-        let along_k = (self.distance[k] + (x_i - x_k).norm(), self.angle[k]);
-        let along_edge = if along_k.0 < along_j.0 { along_k } else { along_j };
+        let along_k = Polar { distance: self.distance[k] + (x_i - x_k).norm(), angle: self.angle[k] };
+        let along_edge = if along_k.distance < along_j.distance { along_k } else { along_j };
         self.unfolded(j, k, [x_j, x_k, x_i]).unwrap_or(along_edge)
     }
 
-    /// In the triangle's plane: `j` at the origin, `k` on the x axis, `i` above it and the virtual source below.
-    fn unfolded(&self, j: usize, k: usize, [x_j, x_k, x_i]: [Point3<f64>; 3]) -> Option<(f64, f64)> {
+    /// Straight path across `jk`, in the triangle's plane: `j` at the origin, `k` on the x axis, `i` above it and the
+    /// virtual source below.
+    fn unfolded(&self, j: usize, k: usize, [x_j, x_k, x_i]: [Point3<f64>; 3]) -> Option<Polar> {
         let (edge, side) = (x_k - x_j, x_i - x_j);
         let length = edge.norm();
         let tip = Vector2::new(side.dot(&edge) / length, side.cross(&edge).norm() / length);
@@ -169,11 +181,12 @@ impl<'a, A: Fn(VertexIdx) -> bool> Front<'a, A> {
         let (to_j, to_k, to_i) =
             (from_source(Vector2::zeros()), from_source(Vector2::new(length, 0.0)), from_source(tip));
         let share = to_j.angle(&to_i) / to_j.angle(&to_k);
-        Some((to_i.norm(), self.angle[j] + share * wrapped(self.angle[k] - self.angle[j])))
+        let angle = self.angle[j] + share * wrapped(self.angle[k] - self.angle[j]);
+        Some(Polar { distance: to_i.norm(), angle })
     }
 }
 
-/// The same angle between `-pi` and `pi`.
+/// Angle wrapped into `-pi` to `pi`.
 fn wrapped(angle: f64) -> f64 {
     angle - TAU * ((angle + PI) / TAU).floor()
 }

@@ -8,7 +8,7 @@ pub use vtu::{Field, write_vtu};
 
 use std::path::{Path, PathBuf};
 
-/// Why a mesh file was not written.
+/// Error of writing a mesh file.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// The file cannot be created or written.
@@ -26,9 +26,9 @@ pub enum ExportError {
         name: String,
         /// Its number of values.
         n_values: usize,
-        /// How many it should hold.
+        /// Number of values needed.
         n_expected: usize,
-        /// Of what: nodes or hexahedra.
+        /// Nodes or hexahedra.
         of: &'static str,
     },
     /// The VTK writer refused the data.

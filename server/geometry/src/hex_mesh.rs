@@ -11,8 +11,7 @@ use crate::isoparametric;
 pub const HEX_FACES: [[usize; 4]; 6] =
     [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
 
-/// A corner's `det J` must exceed this share of `longest_edge^3`: below it the element is flat for all that
-/// rounding can tell.
+/// A corner's `det J` must exceed this share of `longest_edge^3`: below it, rounding hides whether the element is flat.
 const MIN_RELATIVE_DETERMINANT: f64 = 1e-9;
 
 /// Nodes and hexahedra; indices are valid, corners are not inverted, every node is used.
@@ -22,7 +21,7 @@ pub struct HexMesh {
     hexes: Vec<[NodeIdx; 8]>,
 }
 
-/// Why nodes and hexahedra do not make a mesh.
+/// Error of a mesh's nodes and hexahedra.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
     /// No hexahedron.
@@ -71,7 +70,7 @@ pub enum MeshError {
     UnusedNodes {
         /// The first such node.
         first: NodeIdx,
-        /// How many there are.
+        /// Number of such nodes.
         n_unused: usize,
         /// Number of nodes.
         n_nodes: usize,
@@ -81,7 +80,7 @@ pub enum MeshError {
     CrowdedFace {
         /// The face's nodes in increasing order.
         face: [NodeIdx; 4],
-        /// How many hexahedra share it.
+        /// Number of hexahedra that share it.
         n_hexes: usize,
     },
 }
@@ -161,7 +160,7 @@ impl HexMesh {
         self.faces().filter(|face| counts[&sorted(*face)] == 1).collect()
     }
 
-    /// For every node the hexahedra that have it as a corner, in increasing order, `[n_nodes]`.
+    /// Hexahedra around every node, in increasing order, `[n_nodes]`.
     pub fn hexes_around_nodes(&self) -> Vec<Vec<HexIdx>> {
         let mut around = vec![Vec::new(); self.n_nodes()];
         for (hex, corners) in self.hexes.iter().enumerate() {
@@ -172,7 +171,7 @@ impl HexMesh {
         around
     }
 
-    /// For every node the other nodes that share a hexahedron with it, in increasing order, `[n_nodes]`.
+    /// Other nodes of the hexahedra around every node, in increasing order, `[n_nodes]`.
     pub fn node_neighbours(&self) -> Vec<Vec<NodeIdx>> {
         let mut neighbours = vec![Vec::new(); self.n_nodes()];
         for corners in &self.hexes {
@@ -187,8 +186,8 @@ impl HexMesh {
         neighbours
     }
 
-    /// For every node the number of its body, `[n_nodes]`, and how many bodies there are: hexahedra that share a node belong
-    /// to one body. Bodies are numbered in the order of their first nodes.
+    /// Body of every node, `[n_nodes]`, and the number of bodies: hexahedra that share a node belong to one body.
+    /// Bodies are numbered in the order of their first nodes.
     pub fn bodies(&self) -> (Vec<usize>, usize) {
         let neighbours = self.node_neighbours();
         let mut body_of_node = vec![usize::MAX; self.n_nodes()];

@@ -44,7 +44,7 @@ pub fn read_mesh(path: &Path, metres_per_unit: f64) -> Result<NamedMesh, ImportE
     parse_mesh(path, &bytes, metres_per_unit)
 }
 
-/// [`read_mesh`] on the bytes of a file; `path` is used in messages alone.
+/// [`read_mesh`] on the bytes of a file; `path` appears in messages only.
 ///
 /// # Errors
 /// As [`read_mesh`].

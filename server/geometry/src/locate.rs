@@ -1,4 +1,4 @@
-//! Which hexahedron a point lies in.
+//! Point location: the hexahedron that contains a point.
 
 use nalgebra::Point3;
 
@@ -11,12 +11,12 @@ use crate::isoparametric::{closest_point, inverse_map, inverse_map_from, map};
 const INSIDE_TOLERANCE: f64 = 1e-9;
 /// Share of a hexahedron's box by which a point that counts as inside may lie outside the box.
 const BOX_TOLERANCE: f64 = 10.0 * INSIDE_TOLERANCE;
-/// Distances that agree to this share are compared, not trusted: rounding may turn them round.
+/// Relative rounding of distances: boxes nearer than the best distance within it are searched too.
 const ROUNDING: f64 = 1e-9;
-/// Reference coordinates beyond this belong to another branch of the inverse map more often than not.
+/// Reference coordinates beyond this usually belong to another branch of the inverse map.
 const FAR_OUTSIDE: f64 = 3.0;
 
-/// Where a point lies in a mesh.
+/// Location of a point in a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Location {
     /// The containing hexahedron, or the nearest one.
@@ -30,7 +30,7 @@ pub struct Location {
 /// The hexahedron that contains `x` (the one of least index when several do), otherwise the nearest one within
 /// `max_distance_m` of `x` (ties: least index); `None` if there is none.
 ///
-/// This asks every hexahedron: for more than a few points take a [`Locator`], which gives the same answers.
+/// Tests every hexahedron; a [`Locator`] gives the same locations faster for more than a few points.
 pub fn locate(mesh: &HexMesh, x: &Point3<f64>, max_distance_m: f64) -> Option<Location> {
     let boxes: Vec<_> = mesh.hex_indices().map(|hex| (hex, Aabb::around(&mesh.corner_positions(hex)))).collect();
     let touched = boxes.iter().filter(|(_, bounds)| bounds.distance(x) <= BOX_TOLERANCE * bounds.diagonal());
@@ -45,7 +45,7 @@ pub fn locate(mesh: &HexMesh, x: &Point3<f64>, max_distance_m: f64) -> Option<Lo
 pub struct Locator<'a> {
     mesh: &'a HexMesh,
     tree: BoxTree,
-    /// How far outside its box a hexahedron may hold a point \[m\].
+    /// Largest distance outside its box at which a hexahedron contains a point \[m\].
     slack_m: f64,
 }
 
@@ -57,7 +57,7 @@ impl<'a> Locator<'a> {
         Self { mesh, tree: BoxTree::new(boxes), slack_m }
     }
 
-    /// The same as [`locate`].
+    /// Same location as [`locate`].
     pub fn locate(&self, x: &Point3<f64>, max_distance_m: f64) -> Option<Location> {
         let near = |distance_m| self.tree.within(x, distance_m).into_iter().map(|(i, d)| (HexIdx::from_index(i), d));
         containing(self.mesh, x, near(self.slack_m).map(|(hex, _)| hex))
@@ -74,7 +74,7 @@ fn containing(mesh: &HexMesh, x: &Point3<f64>, mut hexes: impl Iterator<Item = H
     })
 }
 
-/// The nearest of hexahedra that are given with the distance to their boxes.
+/// Nearest of the hexahedra, each given with the distance to its box.
 fn nearest(mesh: &HexMesh, x: &Point3<f64>, max_distance_m: f64, mut near: Vec<(HexIdx, f64)>) -> Option<Location> {
     near.sort_unstable_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
     let mut best: Option<Location> = None;
@@ -89,7 +89,7 @@ fn nearest(mesh: &HexMesh, x: &Point3<f64>, max_distance_m: f64, mut near: Vec<(
     best.filter(|found| found.distance_m <= max_distance_m)
 }
 
-/// A hexahedron for a point that it does not contain; `None` where its map cannot be continued to the point.
+/// Location in a hexahedron of a point outside it; `None` where the map cannot be continued to the point.
 fn locate_outside(corners: &[Point3<f64>; 8], hex: HexIdx, x: &Point3<f64>) -> Option<Location> {
     let from_centre = inverse_map(corners, x).filter(|xi| xi.iter().all(|c| c.abs() <= FAR_OUTSIDE));
     let start = from_centre.map_or([0.0; 3], |xi| xi.map(|c| c.clamp(-1.0, 1.0)));

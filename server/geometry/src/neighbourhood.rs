@@ -1,4 +1,4 @@
-//! The nodes that may carry weight at a point: near it, and joined to it through the mesh.
+//! Nodes that may carry weight at a point: near it, and connected to it through the mesh.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -8,7 +8,7 @@ use nalgebra::Point3;
 use crate::hex_mesh::HexMesh;
 use crate::index::{HexIdx, NodeIdx};
 
-/// Finds, for one point after another, the nodes within a radius along the mesh.
+/// Finds the nodes within a radius of a point along the mesh.
 pub(crate) struct Neighbourhoods<'a> {
     mesh: &'a HexMesh,
     neighbours: Vec<Vec<NodeIdx>>,

@@ -45,7 +45,7 @@ impl Predicate {
     }
 }
 
-/// A number, or a truth as 1 or 0.
+/// A number, or a truth value as 1 or 0.
 #[derive(Clone, Debug, PartialEq)]
 enum Expression {
     Constant(f64),

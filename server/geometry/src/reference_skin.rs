@@ -1,4 +1,4 @@
-//! The skin at rest as whoever touches it sees it: where to touch, how thick it is there, and the frame around a point.
+//! Skin at rest as a target of contacts: points on it, thickness of the object behind them, frames around them.
 
 use nalgebra::{Point3, Vector3};
 
@@ -7,7 +7,7 @@ use crate::skin::Skin;
 
 /// A tangential part shorter than this share of the stamp axis gives no direction.
 const DEGENERATE: f64 = 0.1;
-/// A hit nearer than this to where the ray starts is the start itself \[m\].
+/// Hits nearer than this to the ray's origin are the origin itself \[m\].
 const START: f64 = 1e-6;
 
 /// Skin at rest with precomputed tables.
@@ -22,9 +22,9 @@ pub struct ReferenceSkin {
 /// A point of the skin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePoint {
-    /// Where \[m\].
+    /// Position \[m\].
     pub position: Point3<f64>,
-    /// Triangle that it lies on.
+    /// Triangle that contains it.
     pub triangle: TriangleIdx,
     /// Barycentric weights of the triangle's corners.
     pub weights: [f64; 3],
@@ -73,7 +73,7 @@ impl ReferenceSkin {
         (b - a).cross(&(c - a)).normalize()
     }
 
-    /// Triangles that may hold a point of `region` (boxes; none: everywhere), with their areas summed up to each.
+    /// Triangles that may hold a point of `region` (boxes; none: everywhere), with cumulative areas.
     pub fn eligible(
         &self,
         region: &[[Point3<f64>; 2]],
@@ -95,7 +95,7 @@ impl ReferenceSkin {
         eligible
     }
 
-    /// A point of the eligible triangles, uniform by area, from numbers that are uniform in `0..1`. `None` without triangles.
+    /// Point of the eligible triangles, uniform by area, from uniform numbers in `0..1`. `None` without triangles.
     pub fn draw(&self, eligible: &[(TriangleIdx, f64)], mut uniform: impl FnMut() -> f64) -> Option<SurfacePoint> {
         let total = eligible.last()?.1;
         let at = uniform() * total;
@@ -135,7 +135,7 @@ impl ReferenceSkin {
         Some(self.point(TriangleIdx::from_index(triangle), weights))
     }
 
-    /// Normal at a point: those of the corners, blended, so that it turns smoothly over an edge.
+    /// Normal at a point, interpolated from the corners: continuous across edges.
     pub fn normal(&self, point: &SurfacePoint) -> Vector3<f64> {
         let corners = self.skin.triangles()[point.triangle.index()];
         let sum: Vector3<f64> =
@@ -149,7 +149,7 @@ impl ReferenceSkin {
         corners.iter().zip(point.weights).map(|(v, w)| field[v.index()] * w).sum()
     }
 
-    /// How far it is through the object from `start`, a point of the skin, along the unit vector `direction` \[m\].
+    /// Thickness of the object from `start`, a point of the skin, along the unit vector `direction` \[m\].
     pub fn thickness(&self, start: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
         let indices = (0..self.skin.n_triangles()).map(TriangleIdx::from_index);
         let hits = indices.filter_map(|t| ray_hits(start, direction, &self.skin.corner_positions(t)));
@@ -169,7 +169,7 @@ pub fn frame_around(normal: &Vector3<f64>, axes: &[Vector3<f64>; 2]) -> ContactF
     ContactFrame { tau, theta: normal.cross(&tau), normal: *normal }
 }
 
-/// Two axes that are parallel leave nothing: the coordinate axis farthest from the normal.
+/// Tangent for an axis or two along the normal: from the coordinate axis farthest from the normal.
 fn any_tangent(normal: &Vector3<f64>) -> Vector3<f64> {
     let axis = Vector3::ith(normal.iamin(), 1.0);
     (axis - normal * normal.dot(&axis)).normalize()

@@ -7,9 +7,9 @@ use crate::import::{Group, Groups};
 use crate::index::{HexIdx, NodeIdx};
 use crate::predicate::Predicate;
 
-/// A node belongs to a face of the bounding box within this share of the box's diagonal.
+/// Tolerance of a face of the bounding box, as a share of the box's diagonal.
 const FACE_TOLERANCE: f64 = 1e-6;
-/// What lies outside a box by no more than this share of the mesh's diagonal lies inside: rounding.
+/// Tolerance of boxes against rounding, as a share of the mesh's diagonal.
 const BOX_TOLERANCE: f64 = 1e-9;
 
 /// Conditions that must all hold.
@@ -34,7 +34,7 @@ pub struct Side {
     pub upper: bool,
 }
 
-/// Why a selector selects nothing.
+/// Error of a selection.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SelectError {
     /// No group of that name.
@@ -42,7 +42,7 @@ pub enum SelectError {
     UnknownGroup {
         /// The name.
         name: String,
-        /// Names that there are.
+        /// Names in the mesh.
         known: Vec<String>,
     },
     /// The group has no hexahedra.
@@ -56,9 +56,9 @@ pub enum SelectError {
     /// Nothing fulfils all conditions.
     #[error("selects none of {n} {of}")]
     Empty {
-        /// How many there are.
+        /// Number of candidates.
         n: usize,
-        /// Of what.
+        /// Kind of the candidates.
         of: &'static str,
     },
 }

@@ -72,7 +72,7 @@ pub fn wedge(wedge: &Wedge, divisions: [usize; 3]) -> HexMesh {
     lattice_mesh(nodes, divisions).expect("a wedge of positive sizes makes valid hexahedra")
 }
 
-/// Eight corners, and how their inside is divided.
+/// Eight corners, and the divisions between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hexahedron {
     /// Corners \[m\] in `VTK_HEXAHEDRON` order.

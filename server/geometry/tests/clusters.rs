@@ -49,7 +49,7 @@ fn a_skin_of_one_cluster_keeps_its_order() {
     assert_eq!(skin.clone().clustered().positions(), skin.positions());
 }
 
-/// Mean and greatest number of nodes that a cluster needs.
+/// Mean and greatest number of nodes per cluster.
 fn node_list_lengths(skin: &Skin, kind: EmbeddingKind) -> (f64, usize) {
     let embedding = Embedding::new(&default_wedge(), skin.positions(), kind).unwrap();
     let lengths: Vec<usize> = embedding.node_lists(CLUSTER_SIZE).iter().map(Vec::len).collect();

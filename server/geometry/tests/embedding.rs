@@ -1,4 +1,4 @@
-//! Embedding: partition of unity, linear fields, transpose, gaps, smoothness, fall-back, and what bad points get.
+//! Embedding: partition of unity, linear fields, transpose, gaps, smoothness, fall-back, errors of bad points.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod common;
@@ -41,7 +41,7 @@ fn rows_sum_to_one_and_reproduce_linear_fields_on_the_wedge() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Anywhere in a distorted mesh, for any support and any affine map.
+    /// Random points in a distorted mesh, random supports and affine maps.
     #[test]
     fn affine_maps_are_reproduced_anywhere(
         share in prop::array::uniform3(0.0..1.0_f64),
@@ -195,7 +195,7 @@ fn a_support_that_is_too_small_falls_back_to_trilinear_and_is_listed() {
     assert!(unity < 1e-12 && linear < 1e-13);
 }
 
-/// At a node whose neighbours lie just within the radius the moment matrix is regular, but hardly.
+/// At a node whose neighbours lie just within the radius the moment matrix is nearly singular.
 #[test]
 fn an_ill_conditioned_row_falls_back_too() {
     let mesh = block([0.04; 3], [4, 4, 4]);

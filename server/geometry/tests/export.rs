@@ -1,4 +1,4 @@
-//! Mesh files, read back by other people's readers.
+//! Mesh files, read back by third-party readers.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod common;

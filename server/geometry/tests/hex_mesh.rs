@@ -1,4 +1,4 @@
-//! Hexahedral meshes: counts, volumes, boundaries, and what malformed input gets.
+//! Hexahedral meshes: counts, volumes, boundaries, errors of malformed input.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod common;

@@ -1,4 +1,4 @@
-//! Mesh files: what Gmsh and VTK write is read with its groups; what is not hexahedra, and what is damaged, is refused by name.
+//! Mesh files: files of Gmsh and VTK are read with their groups; other volumes and damaged files are refused by name.
 //!
 //! The files in `tests/data` come from `make.py` there.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
@@ -19,7 +19,7 @@ fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
 }
 
-/// The files of `tests/data` whose name fits, in alphabetical order.
+/// Files of `tests/data` with a matching name, in alphabetical order.
 fn files(begin: &str, end: &str) -> Vec<String> {
     let names = std::fs::read_dir(data("")).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
     let mut names: Vec<_> = names.filter(|name| name.starts_with(begin) && name.ends_with(end)).collect();
@@ -150,7 +150,7 @@ fn a_surface_is_told_to_be_one() {
     assert!(message.contains("1 triangles or quads and no hexahedra: it is a surface"), "{message}");
 }
 
-/// What is wrong in text files is told with its line.
+/// Errors in text files carry the line.
 #[test]
 fn faults_in_text_name_their_line() {
     let msh = std::fs::read_to_string(data("boxes-4.1-ascii.msh")).unwrap();
@@ -176,7 +176,7 @@ fn faults_in_text_name_their_line() {
         let named: usize =
             message.split(':').nth(1).unwrap_or("").parse().unwrap_or_else(|_| panic!("a line in: {message}"));
         let expected = line(&bad, to.trim_start());
-        // Arrays are named by the line of their tag, which may stand before the fault.
+        // Arrays are named by the line of their tag, which may precede the fault.
         assert!(
             (expected..=expected + 1).contains(&named)
                 || ["numbers,", "no DataArray"].iter().any(|part| message.contains(part)),
@@ -205,7 +205,7 @@ fn a_missing_node_and_a_twisted_hexahedron_are_named() {
     );
 }
 
-/// In MSH 2.2 a hexahedron of two physical groups stands in the file twice.
+/// MSH 2.2 lists a hexahedron of two physical groups twice.
 #[test]
 fn a_hexahedron_of_two_groups_is_one() {
     let text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n9\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 0 0 1\n6 1 0 1\n7 1 1 1\n\
@@ -223,7 +223,7 @@ fn units_must_be_a_length() {
     }
 }
 
-/// Cut anywhere, a file gives an error or, where only its end is missing, the mesh.
+/// A truncated file gives an error or, if only its end is missing, the mesh.
 #[test]
 fn truncated_files_end_in_an_error() {
     for name in files("", ".msh").into_iter().chain(files("", ".vtu")) {
@@ -233,7 +233,7 @@ fn truncated_files_end_in_an_error() {
     }
 }
 
-/// Whatever the bytes, there is an answer and it is not a panic.
+/// No bytes cause a panic.
 #[test]
 fn damaged_files_end_in_an_answer() {
     let mut random = Random(21);
@@ -261,7 +261,7 @@ fn damaged_files_end_in_an_answer() {
     }
 }
 
-/// Claims of more than there can be cost no memory.
+/// Counts beyond the file's size allocate no memory.
 #[test]
 fn boasting_files_are_refused() {
     let huge = u64::MAX;

@@ -1,4 +1,4 @@
-//! Finding points: the tree of boxes gives what asking every hexahedron gives, and distances are distances.
+//! Point location: the tree of boxes agrees with a test of every hexahedron, and distances are exact.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod common;
@@ -11,7 +11,7 @@ use plica_geometry::isoparametric::{closest_point, inverse_map, map};
 use plica_geometry::shapes::{Wedge, block, wedge};
 use plica_geometry::{Embedding, EmbeddingKind, HexIdx, HexMesh, Locator, NodeIdx, locate};
 
-/// The first hexahedron whose inverse map lands inside, and where.
+/// First hexahedron whose inverse map lands inside, with the reference coordinates.
 fn first_containing(mesh: &HexMesh, x: &Point3<f64>) -> Option<(HexIdx, [f64; 3])> {
     mesh.hex_indices().find_map(|hex| {
         let xi = inverse_map(&mesh.corner_positions(hex), x)?;
@@ -19,7 +19,7 @@ fn first_containing(mesh: &HexMesh, x: &Point3<f64>) -> Option<(HexIdx, [f64; 3]
     })
 }
 
-/// Points in and around a mesh: anywhere in its box and a third beyond.
+/// Points in and around a mesh: its box enlarged by a third.
 fn points_around(mesh: &HexMesh, n: usize) -> Vec<Point3<f64>> {
     let lower = mesh.nodes().iter().fold(mesh.nodes()[0], |a, x| a.inf(x));
     let size = mesh.nodes().iter().fold(lower, |a, x| a.sup(x)) - lower;
@@ -54,7 +54,7 @@ fn every_skin_vertex_of_the_wedge_is_found_in_the_first_hexahedron_that_holds_it
     }
 }
 
-/// How near a regular grid of points of the element comes to `x`.
+/// Least distance of `x` to a regular grid of points of the element.
 fn sampled_distance(corners: &[Point3<f64>; 8], x: &Point3<f64>) -> f64 {
     let grid = |i: usize| -1.0 + 2.0 * i as f64 / 20.0;
     let points = (0..21 * 21 * 21).map(|i| map(corners, [grid(i % 21), grid(i / 21 % 21), grid(i / 441)]));
@@ -116,7 +116,7 @@ fn no_place_is_no_place() {
     assert_eq!(locator.locate(&Point3::new(0.2, 0.0, 0.0), f64::NAN), None);
 }
 
-/// Hexahedra that share a node all hold it: the first is named.
+/// Hexahedra that share a node all contain it: the first one is returned.
 #[test]
 fn a_shared_node_belongs_to_the_first_hexahedron() {
     let mesh = distorted_block();
@@ -127,7 +127,7 @@ fn a_shared_node_belongs_to_the_first_hexahedron() {
     }
 }
 
-/// What the tree is for. Prints the time; run with `--nocapture`.
+/// Speed of the tree. Prints the time; run with `--nocapture`.
 #[test]
 fn thousands_of_points_in_thousands_of_hexahedra() {
     let (mesh, skin) = (wedge(&Wedge::default(), [50, 30, 20]), default_skin());

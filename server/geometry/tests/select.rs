@@ -1,4 +1,4 @@
-//! Conditions in words, and what they select.
+//! Selection by conditions in words.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod common;
@@ -83,7 +83,7 @@ const WORDS: [&str; 20] =
 proptest! {
     #![proptest_config(ProptestConfig { cases: 500, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever the text, there is an answer and it is not a panic.
+    /// No text causes a panic.
     #[test]
     fn any_text_has_an_answer(words in prop::collection::vec(prop::sample::select(&WORDS[..]), 0..12)) {
         if let Ok(condition) = Predicate::parse(&words.concat()) {

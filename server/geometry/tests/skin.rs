@@ -1,4 +1,4 @@
-//! Skins: closed, on the object's boundary, and what malformed input gets.
+//! Skins: closed, on the object's boundary; errors of malformed input.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod common;
@@ -168,7 +168,7 @@ fn an_index_out_of_range_and_an_unused_vertex_are_refused() {
     assert_eq!(Skin::new(positions, triangles), Err(expected));
 }
 
-/// Two tetrahedra that touch in one vertex: every edge is fine, the vertex is not.
+/// Two tetrahedra that share one vertex: every edge is manifold, the vertex is not.
 #[test]
 fn surfaces_that_touch_in_a_point_are_refused() {
     let (mut positions, mut triangles) = tetrahedron();

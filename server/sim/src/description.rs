@@ -1,11 +1,11 @@
-//! A scene as plain data: what a [`Model`](crate::Model) is built from. SI units; right-handed, z up.
+//! A scene as plain data: input of [`Model`](crate::Model). SI units; right-handed, z up.
 
 use std::borrow::Cow;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use plica_geometry::{ConvexPolytope, Embedding, HexMesh, HullError, Skin};
 
-/// Everything that is fixed while a scene runs.
+/// Constant data of a scene.
 #[derive(Debug, Clone)]
 pub struct ModelDescription {
     /// Coarse mesh.
@@ -22,7 +22,7 @@ pub struct ModelDescription {
     pub mass_damping_per_s: f64,
     /// Acceleration of free fall \[m/s2\].
     pub gravity_m_per_s2: Vector3<f64>,
-    /// Which hexahedron the stiffness is computed with.
+    /// Element of the stiffness.
     pub element: ElementKind,
     /// Length of a tick \[s\].
     pub timestep_s: f64,
@@ -32,7 +32,7 @@ pub struct ModelDescription {
     pub solver: SolverOptions,
     /// Contact detection and law.
     pub contact: ContactOptions,
-    /// When an object at rest stops being solved.
+    /// Conditions for skipping the solve of an object at rest.
     pub sleep: SleepOptions,
     /// Tools, in the order in which [`ToolPose::tool`](crate::ToolPose) counts them.
     pub tools: Vec<ToolDescription>,
@@ -66,11 +66,11 @@ pub enum ElementKind {
 pub struct SolverOptions {
     /// Preconditioner of the conjugate gradients.
     pub preconditioner: Preconditioner,
-    /// Exit when the residual has fallen to this share of the first one.
+    /// Residual at which the solve ends, as a share of the first one.
     pub tolerance: f64,
     /// Iterations after which the solve is restored and repeated with block Jacobi.
     pub max_iterations: u32,
-    /// Iterations of that repetition.
+    /// Iterations of the repeated solve.
     pub fallback_iterations: u32,
 }
 
@@ -95,7 +95,7 @@ pub enum Preconditioner {
 /// Contact detection and law (MATH.md, "Contact").
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactOptions {
-    /// Penalty over the effective stiffness `1/(h^2 w)` of the touched skin point \[-\].
+    /// Penalty over the effective stiffness `1/(h^2 w)` of the skin point in contact \[-\].
     pub stiffness_ratio: f64,
     /// Share of the multiplier error corrected per tick, in (0, 1].
     pub multiplier_relaxation: f64,
@@ -125,14 +125,14 @@ impl Default for ContactOptions {
     }
 }
 
-/// When an object at rest stops being solved.
+/// Conditions for skipping the solve of an object at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SleepOptions {
-    /// Whether it ever does.
+    /// Whether an object sleeps at all.
     pub enabled: bool,
-    /// Fastest node below which it counts as at rest \[m/s\].
+    /// Node speed below which the object is at rest \[m/s\].
     pub speed_m_per_s: f64,
-    /// How long it must have been at rest, with no tool near \[s\].
+    /// Time at rest, with no tool near, before it sleeps \[s\].
     pub after_s: f64,
 }
 
@@ -142,20 +142,20 @@ impl Default for SleepOptions {
     }
 }
 
-/// A tool that touches the object.
+/// A tool of the scene.
 #[derive(Debug, Clone)]
 pub struct ToolDescription {
     /// Name on the bus.
     pub name: String,
     /// Shape around the tool's origin.
     pub shape: ToolShape,
-    /// How the simulated proxy follows the device.
+    /// Coupling of the simulated proxy to the device.
     pub coupling: Coupling,
     /// Coulomb friction coefficient against the skin.
     pub friction: f64,
-    /// How device poses become one pose per tick.
+    /// Sampling of device poses, one pose per tick.
     pub sampling: Sampling,
-    /// Fastest motion that is followed; a faster jump re-places the tool without sweep \[m/s\].
+    /// Largest speed that is followed; a faster jump re-places the tool without sweep \[m/s\].
     pub max_tool_speed_m_per_s: f64,
     /// A tool without a new pose for this long is held and flagged \[s\].
     pub stale_after_s: f64,
@@ -214,10 +214,10 @@ impl ToolShape {
     }
 }
 
-/// How the simulated proxy follows the device.
+/// Coupling of the simulated proxy to the device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Coupling {
-    /// The proxy is where the device is.
+    /// The proxy has the pose of the device.
     Rigid,
     /// A light rigid body on a saturating 6-DOF spring-damper.
     Spring(SpringCoupling),
@@ -253,7 +253,7 @@ impl Default for SpringCoupling {
     }
 }
 
-/// How device poses become one pose per tick.
+/// Sampling of device poses, one pose per tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Sampling {
     /// The newest pose, approached at `max_tool_speed_m_per_s` at most.
@@ -265,7 +265,7 @@ pub enum Sampling {
     },
 }
 
-/// An immovable half-space: the object stays on the side that `normal` points to.
+/// An immovable half-space; `normal` points to the side of the object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plane {
     /// A point of the surface \[m\].

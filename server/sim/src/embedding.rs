@@ -2,8 +2,8 @@
 //!
 //! The vertices of half a cluster share one node list, so a node's displacement is loaded once for 32 rows: four to five
 //! times faster than a sparse row per vertex. Weights are 16-bit fixed-point, which halves what is read: the stage is bound by
-//! memory. The rounding is at most 2.3e-5 of a displacement per weight, and a row still sums to what it summed to within
-//! that. Contact rows use the same rounded weights, one sparse row per vertex.
+//! memory. The rounding is at most 2.3e-5 of a displacement per weight, and a row keeps its sum to within that. Contact
+//! rows use the same rounded weights, one sparse row per vertex.
 
 use plica_geometry::{CLUSTER_SIZE, Embedding, Skin};
 
@@ -124,7 +124,7 @@ impl SkinEmbedding {
         }
     }
 
-    /// The same with a fourth component of zero.
+    /// Offsets with a fourth component of zero.
     pub(crate) fn copy_padded_offsets(&self, skin: &SkinPositions, out: &mut [Node]) {
         let clusters = skin.positions.iter().zip(&self.clusters);
         for (chunk, (deformed, cluster)) in out[..self.n_skin].chunks_mut(CLUSTER_SIZE).zip(clusters) {
@@ -232,7 +232,7 @@ impl Strip {
     }
 }
 
-/// Rounds so that the sum is rounded once: each entry takes what its predecessors' rounding left over.
+/// Rounds with the error carried to the next entry, so that the sum is rounded once.
 fn round_keeping_sum(values: impl Iterator<Item = f64>) -> impl Iterator<Item = i16> {
     values.scan(0.0, |left_over, value| {
         let rounded = (value + *left_over).round();

@@ -1,7 +1,8 @@
 //! The run-time phase of Plica: one soft object, stepped by an implicit corotational finite-element method against tools.
 //!
-//! Three boxes: a [`Model`] is built once and never changes, a [`State`] is everything that a tick changes and can be
-//! copied as a snapshot, a [`Workspace`] is scratch that means nothing between calls. [`tick`](tick()) takes one time step and
+//! Three boxes: a [`Model`] is built once and never changes, a [`State`] holds all that a tick changes and can be
+//! copied as a snapshot, a [`Workspace`] is scratch that means nothing between calls. [`tick`](tick()) takes one time
+//! step and
 //! allocates nothing.
 //!
 //! This crate knows no bus, no thread and no clock: time is an argument. Run-time arithmetic is `f32`, construction is `f64`.
@@ -17,6 +18,7 @@ mod model;
 mod probe;
 mod report;
 mod rotation;
+mod smoothstep;
 mod solver;
 mod state;
 mod step;
@@ -37,10 +39,10 @@ pub use tick::tick;
 pub use tool::{PoseSample, ToolPose, world_from_tool};
 pub use workspace::Workspace;
 
-/// What one tick is told: the time, and the device poses that arrived since the last one.
+/// Input of one tick: time, and device poses received since the last tick.
 #[derive(Debug, Clone, Copy)]
 pub struct TickInput<'a> {
-    /// The caller's clock at this tick \[s\]. Staleness and interpolation are judged on it; it must not run backwards.
+    /// The caller's clock at this tick \[s\]. Measures staleness and interpolation; must not run backwards.
     pub clock_s: f64,
     /// Device poses that arrived since the last tick, in order of arrival.
     pub poses: &'a [ToolPose],

@@ -1,4 +1,4 @@
-//! What never changes while a scene runs: tables built from a [`ModelDescription`].
+//! Constant tables of a scene, built from a [`ModelDescription`].
 
 use plica_geometry::HexMesh;
 use thiserror::Error;
@@ -20,17 +20,17 @@ const QUASI_STATIC_S: f64 = 0.1;
 /// Least inverse mass of a skin point, as a share of the mean: points next to fixed nodes are not infinitely stiff.
 const INVERSE_MASS_FLOOR: f32 = 0.05;
 
-/// Why a model could not be built.
+/// Error of building a model.
 #[derive(Debug, Error)]
 pub enum ModelError {
-    /// An array of the description has another length than the mesh or skin asks for.
+    /// An array of the description does not have the length of the mesh or skin.
     #[error("{what}: {found} entries, but {expected} are needed")]
     Length {
-        /// Which array.
+        /// The array.
         what: &'static str,
         /// Its length.
         found: usize,
-        /// The length it should have.
+        /// Length needed.
         expected: usize,
     },
     /// Every node is fixed.
@@ -42,11 +42,11 @@ pub enum ModelError {
     /// A number is outside its range.
     #[error("{what} is {value}, allowed is {range}")]
     Range {
-        /// Which number.
+        /// The quantity.
         what: &'static str,
         /// Its value.
         value: f64,
-        /// What it may be.
+        /// Allowed range.
         range: &'static str,
     },
     /// The points of a tool's hull do not span a volume.
@@ -110,7 +110,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// Precomputes everything that a tick needs. Seconds for thousands of hexahedra, milliseconds for the wedge.
+    /// Precomputes all tables of a tick. Seconds for thousands of hexahedra, milliseconds for the wedge.
     pub fn new(description: ModelDescription) -> Result<Self, ModelError> {
         check(&description)?;
         let d = &description;
@@ -146,7 +146,7 @@ impl Model {
         })
     }
 
-    /// What the model was built from.
+    /// Description of the scene.
     pub fn description(&self) -> &ModelDescription {
         &self.description
     }
@@ -190,13 +190,13 @@ impl Model {
         self.solids.len()
     }
 
-    /// Most contact rows of one body.
+    /// Largest number of contact rows of one body.
     pub(crate) fn max_contacts(&self, body: usize) -> usize {
         let options = &self.description.contact;
         if body < self.n_tools() { options.max_contacts } else { options.max_support_contacts }
     }
 
-    /// Most contact rows of all bodies together.
+    /// Largest number of contact rows of all bodies together.
     pub(crate) fn max_rows(&self) -> usize {
         (0..self.n_bodies()).map(|b| self.max_contacts(b)).sum()
     }
@@ -248,7 +248,7 @@ fn node_mass(mesh: &HexMesh, order: &NodeOrder, materials: &[Material]) -> Vec<f
     mass
 }
 
-/// The rest matrix of a step, inverted as far as the solver options ask for.
+/// Inverses of the rest matrix of a step, by the solver options.
 struct RestInverse {
     tridiagonal: Option<BlockTridiagonal>,
     jacobi: BlockJacobi,
@@ -257,7 +257,7 @@ struct RestInverse {
 impl RestInverse {
     /// `None` if a block is singular.
     fn new(d: &ModelDescription, order: &NodeOrder, mass: &[f64], h: f64) -> Option<Self> {
-        let matrix = RestMatrix::new(&d.mesh, order, mass, &d.materials, d.element, (h, d.mass_damping_per_s));
+        let matrix = RestMatrix::new(d, order, mass, h);
         let wants_factor = match d.solver.preconditioner {
             Preconditioner::Auto => BlockTridiagonal::bytes_for(order) <= AUTO_FACTOR_BYTES,
             Preconditioner::BlockTridiagonal => true,
@@ -268,8 +268,8 @@ impl RestInverse {
     }
 }
 
-/// `tr(J A_0^-1 J^T) / 3` of each skin vertex \[1/kg\]: how far it yields to a unit impulse. Without a factorisation the
-/// diagonal blocks stand in, which overstates the stiffness.
+/// `tr(J A_0^-1 J^T) / 3` of each skin vertex \[1/kg\]: how far it yields to a unit impulse. Without a factorisation
+/// computed from the diagonal blocks, which overstates the stiffness.
 fn inverse_masses(
     embedding: &SkinEmbedding,
     n_free: usize,

@@ -13,7 +13,7 @@ pub enum Stage {
     Embedding,
     /// The two non-finite gates and the copy kept for roll-back.
     Gates,
-    /// Contacts followed, and detail added to the skin where somebody wants it: after the tick, by who hands it out.
+    /// Windows of detail follow contacts, and detail is added to published skins; after the tick, by the caller.
     Enrichment,
 }
 
@@ -35,7 +35,7 @@ impl Stage {
     }
 }
 
-/// Told at every stage boundary. Must not allocate, lock or call the system (reading a clock is the caller's choice).
+/// Called at every stage boundary. Must not allocate, lock or call the system (reading a clock is the caller's choice).
 pub trait Probe {
     /// `stage` begins; the stage before it ends.
     fn enter(&mut self, stage: Stage);

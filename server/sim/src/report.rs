@@ -1,8 +1,8 @@
-//! What a tick reports.
+//! Reports of a tick.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-/// What happened in one tick.
+/// Statistics of one tick.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct TickReport {
     /// Iterations of the linear solver, over all passes and sub-steps.
@@ -25,13 +25,13 @@ pub struct TickReport {
     pub sleeping: bool,
 }
 
-/// What one tool feels after a tick. World frame.
+/// Reading of one tool after a tick. World frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToolReading {
-    /// Whether a pose was ever received; an absent tool touches nothing.
+    /// Whether a pose was ever received; an absent tool has no contacts.
     pub present: bool,
     /// Force on the tool \[N\]. With a spring coupling: the bounded force that the device should
-    /// display, which is zero while nothing is touched.
+    /// display, which is zero without contact.
     pub force_n: Vector3<f64>,
     /// Torque on the tool about the proxy's origin \[N m\].
     pub torque_n_m: Vector3<f64>,

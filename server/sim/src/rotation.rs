@@ -15,7 +15,7 @@ pub(crate) const IDENTITY: Quaternions = [F::ZERO, F::ZERO, F::ZERO, F::ONE];
 
 /// A step that turns no lane by more than this leaves an error of the order of its square \[rad\].
 const SMALL_TURN: f32 = 0.1;
-/// Most steps in one go.
+/// Largest number of steps per call.
 const MAX_STEPS: u32 = 8;
 
 /// Turns `q` to the polar rotation of `f` and returns it as a matrix: one step, and more only after a large turn.

@@ -1,4 +1,4 @@
-//! What a tick changes. A clone is a snapshot; [`State::copy_from`] restores one without allocating.
+//! State that a tick changes. A clone is a snapshot; [`State::copy_from`] restores one without allocating.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -10,7 +10,7 @@ use crate::report::{ContactReading, ToolReading};
 use crate::rotation::{IDENTITY, Quaternions};
 use crate::tool::PoseTrack;
 
-/// Everything that a tick changes.
+/// State of a scene between ticks.
 #[derive(Debug)]
 pub struct State {
     pub(crate) tick: u64,
@@ -18,7 +18,7 @@ pub struct State {
     pub(crate) u: Vec<Node>,
     /// Nodal velocities \[m/s\].
     pub(crate) v: Vec<Node>,
-    /// Constant forces on free nodes, in internal order \[N\]; empty where nothing but tools, gravity and supports acts.
+    /// Constant forces on free nodes, in internal order \[N\]; empty without external forces.
     pub(crate) external_forces: Vec<Node>,
     /// Rotation of each element, by batch.
     pub(crate) quaternions: Vec<Quaternions>,
@@ -28,7 +28,7 @@ pub struct State {
     pub(crate) tracks: Vec<PoseTrack>,
     pub(crate) proxies: Vec<Proxy>,
     pub(crate) readings: Vec<ToolReading>,
-    /// How long the object has been at rest with no tool near \[s\].
+    /// Time at rest with no tool near \[s\].
     pub(crate) quiet_s: f64,
     pub(crate) sleeping: bool,
     pub(crate) rollbacks: u64,
@@ -97,7 +97,7 @@ impl State {
         self.tick as f64 * self.timestep_s
     }
 
-    /// What each tool feels.
+    /// Readings of the tools.
     pub fn tools(&self) -> &[ToolReading] {
         &self.readings
     }
@@ -122,7 +122,7 @@ impl State {
         model.embedding.copy_offsets(&self.skin, out);
     }
 
-    /// The same with a fourth component of zero, `[n_skin]` \[m\].
+    /// Offsets with a fourth component of zero, `[n_skin]` \[m\].
     pub fn write_padded_offsets(&self, model: &Model, out: &mut [[f32; 4]]) {
         model.embedding.copy_padded_offsets(&self.skin, out);
     }
@@ -148,8 +148,9 @@ impl State {
         model.embedding.apply(&self.u, &mut self.skin);
     }
 
-    /// Sets constant forces that act in every tick from now on, in the order of the mesh's nodes, `[n_nodes]` \[N\]; an empty
-    /// slice takes them away. Fixed nodes bear theirs. For training: the suction that lifts the skin, which contact cannot.
+    /// Sets constant forces that act in every tick from now on, in the order of the mesh's nodes, `[n_nodes]` \[N\]; an
+    /// empty slice removes them. Forces on fixed nodes have no effect. Training lifts the skin with them, which contact
+    /// cannot.
     ///
     /// # Panics
     /// If there are neither none nor `n_nodes` forces.

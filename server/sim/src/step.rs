@@ -9,7 +9,7 @@ use crate::contact::{
     ContactCoupling, Placement, ProxyMotion, Rows, Search, Selection, V3, at_arm, contact_point, evaluate,
     predict_secant, settle, stack_forces,
 };
-use crate::lanes::Node;
+use crate::lanes::{Mat3, Node};
 use crate::model::Model;
 use crate::probe::{Probe, Stage};
 use crate::report::TickReport;
@@ -20,18 +20,18 @@ use crate::workspace::Workspace;
 
 /// Passes in which rows may switch either way.
 const FREE_PASSES: u32 = 4;
-/// Passes in all; the later ones only switch rows off and lower their friction.
+/// Largest number of passes; later ones only switch rows off and lower their friction.
 const MAX_PASSES: u32 = 12;
-/// A solve may leave this share of the contact impulse as residual.
+/// Residual of a solve, as a share of the contact impulse.
 const IMPULSE_TOLERANCE: f32 = 1e-4;
-/// A multiplier may grow to what presses its skin point this many cells deep.
+/// Indentation whose static force bounds a multiplier, in cells.
 const MAX_PRESS_CELLS: f32 = 4.0;
-/// One step sets out to resolve no more penetration than this share of a cell.
+/// Largest penetration that one step resolves, in cells.
 const MAX_CORRECTION_CELLS: f32 = 0.1;
-/// No node gets faster \[m/s\]: several times what a hand or a free ring-down reaches, and a bound on what a tool that is
-/// forced through the object can fling.
+/// Speed limit of nodes \[m/s\]: several times the speeds of a hand or a free ring-down, and a bound on those from a
+/// tool forced through the object.
 const MAX_NODE_SPEED: f32 = 10.0;
-/// Contacts are looked for no farther than this many cells away.
+/// Largest reach of contact detection, in cells.
 const MAX_REACH_CELLS: f32 = 2.0;
 
 /// One step of `model.dt`; sub-step `index` of the tick.
@@ -104,7 +104,7 @@ pub(crate) fn load_residual(model: &Model, state: &State, workspace: &mut Worksp
     }
 }
 
-/// The part of this tick's motion that belongs to one sub-step.
+/// Part of this tick's motion in one sub-step.
 fn substep_target(model: &Model, index: u32, target: &Target) -> Target {
     let n = f64::from(model.description.substeps);
     let at = |share: f64| {
@@ -182,8 +182,9 @@ pub(crate) fn find_contacts(model: &Model, state: &State, workspace: &mut Worksp
 
 /// Displacements before the solve, stiffness, and which rows are expected to push.
 ///
-/// Stiffness `kappa / (h^2 w o)`: `1 / (h^2 w)` is what the skin point itself resists with, mass included, so that nothing
-/// depends on Young's modulus or the time step; `o` counts the rows that load the same place. A floor on `w` keeps points
+/// Stiffness `kappa / (h^2 w o)`: `1 / (h^2 w)` is the stiffness of the skin point itself, mass included, so that
+/// `kappa` depends on neither Young's modulus nor the time step; `o` counts the rows that load the same surroundings. A
+/// floor on `w` keeps points
 /// next to fixed nodes from becoming infinitely stiff.
 fn predict_rows(model: &Model, rows: &mut Rows, motions: &[ProxyMotion]) {
     let (h, kappa) = (model.dt, model.description.contact.stiffness_ratio as f32);
@@ -243,7 +244,8 @@ fn solve(model: &Model, workspace: &mut Workspace, residual_bound: f32) -> (CgIn
     let options = &model.description.solver;
     let Workspace { rotations, warp, cg, dv, residual, dv_before, residual_before, rows, coupling, motions, .. } =
         workspace;
-    let mut multiply = |p: &[Node], out: &mut [Node]| multiply(model, rotations, (coupling, rows, motions), p, out);
+    let mut matrix = ImplicitMatrix { model, rotations, coupling, rows, motions };
+    let mut multiply = |p: &[Node], out: &mut [Node]| matrix.multiply(p, out);
     let primary = CgStop { residual: residual_bound, max_iterations: options.max_iterations };
     let Some(tridiagonal) = &model.tridiagonal else {
         let jacobi = |r: &[Node], z: &mut [Node]| model.jacobi.apply(r, z);
@@ -264,25 +266,30 @@ fn solve(model: &Model, workspace: &mut Workspace, residual_bound: f32) -> (CgIn
     (CgInfo { iterations: info.iterations + second.iterations, ..second }, true)
 }
 
-/// `out = A p`
-#[inline(always)]
-fn multiply(
-    model: &Model,
-    rotations: &[crate::lanes::Mat3],
-    (coupling, rows, motions): (&mut ContactCoupling, &Rows, &[ProxyMotion]),
-    p: &[Node],
-    out: &mut [Node],
-) {
-    let h = model.dt;
-    let inertia = 1.0 + h * model.description.mass_damping_per_s as f32;
-    set_zero(out);
-    model.elements.add_product(p, h * h, rotations, out);
-    for ((out, p), m) in out.iter_mut().zip(p).zip(&model.node_mass) {
-        for k in 0..4 {
-            out[k] = (m * inertia).mul_add(p[k], out[k]);
+/// `A` at the present rotations, with the active contact rows.
+struct ImplicitMatrix<'a> {
+    model: &'a Model,
+    rotations: &'a [Mat3],
+    coupling: &'a mut ContactCoupling,
+    rows: &'a Rows,
+    motions: &'a [ProxyMotion],
+}
+
+impl ImplicitMatrix<'_> {
+    /// `out = A p`
+    #[inline(always)]
+    fn multiply(&mut self, p: &[Node], out: &mut [Node]) {
+        let h = self.model.dt;
+        let inertia = 1.0 + h * self.model.description.mass_damping_per_s as f32;
+        set_zero(out);
+        self.model.elements.add_product(p, h * h, self.rotations, out);
+        for ((out, p), m) in out.iter_mut().zip(p).zip(&self.model.node_mass) {
+            for k in 0..4 {
+                out[k] = (m * inertia).mul_add(p[k], out[k]);
+            }
         }
+        self.coupling.add_product(self.rows, self.motions, h, p, out);
     }
-    coupling.add_product(rows, motions, h, p, out);
 }
 
 /// `v += dv`, `x += h v`; nodes faster than [`MAX_NODE_SPEED`] are slowed to it.
@@ -299,7 +306,7 @@ fn advance(model: &Model, state: &mut State, workspace: &Workspace) {
     }
 }
 
-/// Multipliers for the next step, and what the report says about contact.
+/// Multipliers for the next step, and contact figures of the report.
 fn remember_contacts(model: &Model, state: &mut State, workspace: &mut Workspace, report: &mut TickReport) {
     let options = &model.description.contact;
     let decay = (1.0 - f64::from(model.dt) / options.recovery_time_s).max(0.0) as f32;

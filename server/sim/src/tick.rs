@@ -13,7 +13,7 @@ use crate::state::State;
 use crate::step::{move_tools_freely, step};
 use crate::workspace::Workspace;
 
-/// Displacements beyond this many half diagonals of the object are beyond recovery.
+/// Largest recoverable displacement, in half diagonals of the object.
 const MAX_DISPLACEMENT: f32 = 10.0;
 
 /// Takes one time step. Allocates nothing; the result depends on nothing but the arguments.
@@ -54,7 +54,7 @@ fn take_poses(model: &Model, input: &TickInput<'_>, state: &mut State, report: &
     }
 }
 
-/// Where each device is at the end of this tick; a placed tool forgets its contacts.
+/// Target of each tool at the end of this tick; a placed tool forgets its contacts.
 fn aim_tools(model: &Model, clock_s: f64, state: &mut State, workspace: &mut Workspace) {
     for (index, tool) in model.description.tools.iter().enumerate() {
         let target = state.tracks[index].advance(tool, clock_s, model.timestep_s());
@@ -92,7 +92,7 @@ fn any_tool_is_near(model: &Model, state: &State, workspace: &mut Workspace) -> 
     })
 }
 
-/// A second roll-back within this many ticks means that the last good state is none: the object returns to its rest shape.
+/// Ticks within which a second roll-back discards the last good state too: the object returns to its rest shape.
 const RELAPSE_TICKS: u64 = 50;
 
 /// Output gate: a state that is not finite, or that has left the scene, is replaced by the last good one, at rest.
@@ -126,8 +126,8 @@ fn gate_output(model: &Model, state: &mut State, workspace: &mut Workspace, repo
     model.embedding.apply(&state.u, &mut state.skin);
 }
 
-/// What each tool feels: with a spring the bounded coupling force while it touches, else the contact forces. What drags a
-/// proxy through free air (its inertia, and the steps of a slow tracker) is nothing that a hand should feel.
+/// Readings of the tools. Force: with a spring the bounded coupling force during contact, else the contact forces. The
+/// coupling force in free air (inertia of the proxy, steps of a slow tracker) is not displayed.
 fn write_readings(model: &Model, input: &TickInput<'_>, state: &mut State, workspace: &Workspace) {
     for (index, tool) in model.description.tools.iter().enumerate() {
         let (track, proxy) = (&state.tracks[index], &state.proxies[index]);

@@ -9,9 +9,9 @@ use crate::description::{Sampling, ToolDescription};
 pub struct PoseSample {
     /// Sequence number of its source.
     pub sequence: u64,
-    /// Time on its source's clock \[ns\], if the source knows it; else the time of arrival stands in.
+    /// Time on its source's clock \[ns\], if known; else the time of arrival.
     pub source_time_ns: Option<u64>,
-    /// Whether the tracker saw the marker; an invalid sample is no news.
+    /// Whether the tracker saw the marker; an invalid sample is ignored.
     pub valid: bool,
     /// `tracker <- marker` \[m\].
     pub pose: Isometry3<f64>,
@@ -31,21 +31,21 @@ const RING: usize = 16;
 
 /// A sample in world coordinates with its arrival.
 #[derive(Debug, Clone, Copy)]
-struct Arrived {
+struct ReceivedPose {
     /// Counts samples, from 1.
     number: u64,
     arrival_s: f64,
-    /// Time on the source's clock, if it knows it.
+    /// Time on the source's clock, if known.
     source_s: Option<f64>,
     world_from_tool: Isometry3<f64>,
-    /// The tool cannot have moved here from the sample before: it is placed.
+    /// Motion from the previous sample exceeds the speed limit: the tool is re-placed.
     is_jump: bool,
 }
 
 /// The pose ring of one tool and the target that its proxy follows.
 #[derive(Debug, Clone)]
 pub(crate) struct PoseTrack {
-    ring: [Option<Arrived>; RING],
+    ring: [Option<ReceivedPose>; RING],
     newest: usize,
     /// Smallest `arrival - source time` seen \[s\].
     clock_offset_s: f64,
@@ -57,7 +57,7 @@ pub(crate) struct PoseTrack {
     reached: u64,
 }
 
-/// Where the device is at the end of this tick, and how it moved in it.
+/// Motion of the device in this tick.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Target {
     pub(crate) pose: Isometry3<f64>,
@@ -81,7 +81,7 @@ impl PoseTrack {
         }
     }
 
-    /// Takes a sample in. Returns false, and changes nothing, if a component is not finite.
+    /// Adds a sample. Returns false, without change, if a component is not finite.
     pub(crate) fn push(&mut self, tool: &ToolDescription, sample: &PoseSample, clock_s: f64) -> bool {
         if !is_finite(&sample.pose) {
             return false;
@@ -90,7 +90,7 @@ impl PoseTrack {
             return true;
         }
         let source_s = sample.source_time_ns.map(|ns| ns as f64 * 1e-9);
-        let mut arrived = Arrived {
+        let mut received = ReceivedPose {
             number: 1,
             arrival_s: clock_s,
             source_s,
@@ -98,14 +98,14 @@ impl PoseTrack {
             is_jump: false,
         };
         if let Some(last) = self.ring[self.newest] {
-            arrived.number = last.number + 1;
-            arrived.is_jump = is_jump(&last, &arrived, tool.max_tool_speed_m_per_s);
+            received.number = last.number + 1;
+            received.is_jump = is_jump(&last, &received, tool.max_tool_speed_m_per_s);
             if source_s.zip(last.source_s).is_some_and(|(now, before)| now < before) {
                 self.forget_source();
             }
         }
         self.newest = (self.newest + 1) % RING;
-        self.ring[self.newest] = Some(arrived);
+        self.ring[self.newest] = Some(received);
         self.clock_offset_s = source_s.map_or(f64::INFINITY, |s| clock_s - s).min(self.clock_offset_s);
         self.sequence = sample.sequence;
         self.source_time_ns = sample.source_time_ns.unwrap_or(0);
@@ -143,7 +143,7 @@ impl PoseTrack {
         self.ring.iter().flatten().any(|s| s.is_jump && s.number > self.reached && s.number <= number)
     }
 
-    /// The source's clock went back: it started again, and old times mean nothing any more.
+    /// Drops all samples: the source's clock went back, so it restarted.
     fn forget_source(&mut self) {
         self.ring = [None; RING];
         self.clock_offset_s = f64::INFINITY;
@@ -152,13 +152,13 @@ impl PoseTrack {
     /// Pose at `time_s` on the caller's clock, from the two samples around it, and the number of the earlier one; held at
     /// either end of the ring, and before a jump.
     fn interpolate(&self, time_s: f64) -> Option<(Isometry3<f64>, u64)> {
-        let mut after: Option<Arrived> = None;
+        let mut after: Option<ReceivedPose> = None;
         for back in 0..RING {
             let Some(sample) = self.ring[(self.newest + RING - back) % RING] else { break };
             let at_s = self.clock_time_s(&sample);
             if at_s <= time_s {
                 let next = after.filter(|a| !a.is_jump);
-                let share = |next: &Arrived| (time_s - at_s) / (self.clock_time_s(next) - at_s).max(1e-9);
+                let share = |next: &ReceivedPose| (time_s - at_s) / (self.clock_time_s(next) - at_s).max(1e-9);
                 let pose = next.map_or(sample.world_from_tool, |next| {
                     blend(&sample.world_from_tool, &next.world_from_tool, share(&next).clamp(0.0, 1.0))
                 });
@@ -169,8 +169,8 @@ impl PoseTrack {
         after.map(|a| (a.world_from_tool, a.number))
     }
 
-    /// When a sample was taken, on the caller's clock: its source's time shifted by the smallest latency seen \[s\].
-    fn clock_time_s(&self, sample: &Arrived) -> f64 {
+    /// Time of a sample on the caller's clock: its source's time shifted by the smallest latency seen \[s\].
+    fn clock_time_s(&self, sample: &ReceivedPose) -> f64 {
         sample.source_s.map_or(sample.arrival_s, |s| s + self.clock_offset_s)
     }
 }
@@ -183,8 +183,8 @@ pub fn world_from_tool(tool: &ToolDescription, tracker_from_marker: &Isometry3<f
         * tool.tool_from_marker.inverse()
 }
 
-/// Whether the tool would have to be faster than it may be to get from one sample to the next.
-fn is_jump(from: &Arrived, to: &Arrived, max_speed: f64) -> bool {
+/// Whether the motion between two samples exceeds the speed limit.
+fn is_jump(from: &ReceivedPose, to: &ReceivedPose, max_speed: f64) -> bool {
     let distance = (to.world_from_tool.translation.vector - from.world_from_tool.translation.vector).norm();
     let by_source = to.source_s.zip(from.source_s).map_or(0.0, |(to, from)| to - from);
     let elapsed = by_source.max(to.arrival_s - from.arrival_s);

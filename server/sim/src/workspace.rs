@@ -35,7 +35,7 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// Scratch for any state of this model.
+    /// Scratch for every state of a model.
     pub fn new(model: &Model) -> Self {
         let (n_nodes, n_free, n_batches) = (model.n_nodes(), model.n_free, model.elements.n_batches());
         let nodes = || vec![[0.0; 4]; n_nodes];

@@ -1,5 +1,5 @@
-//! Where methods fail: inverted elements, tools forced through, shaken, pinching, teleporting. Nothing may explode, and what is
-//! let go must come back.
+//! Extreme use: inverted elements, tools forced through, shaken, pinching, teleporting. The object stays bounded, and
+//! recovers after release.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod common;
@@ -11,10 +11,10 @@ use plica_sim::*;
 const RADIUS_M: f64 = 0.01;
 /// Longest edge of the wedge [m].
 const OBJECT_M: f64 = 0.12;
-/// How long a tool drives, and how long the object is then left alone [s].
+/// Duration of the motion of tools, and of the recovery after it [s].
 const DRIVEN_S: f64 = 0.6;
 const FREE_S: f64 = 0.8;
-/// Where an absent tool waits.
+/// Position of an absent tool.
 const AWAY: Point3<f64> = Point3::new(0.05, 0.03, 0.5);
 
 /// One run of the suite.
@@ -26,7 +26,7 @@ struct Case {
     coupling: Coupling,
 }
 
-/// What became of it.
+/// Result of a run.
 #[derive(Debug, Clone, Copy, Default)]
 struct Outcome {
     rollbacks: u64,
@@ -88,7 +88,7 @@ impl Case {
 
 impl Outcome {
     fn watch(&mut self, run: &Run, report: &TickReport) {
-        // The skin is looked at now and then, to save time.
+        // The skin is sampled every few ticks, to save time.
         if run.state.tick().is_multiple_of(10) {
             let offsets = run.offsets();
             self.finite &= offsets.iter().all(|o| o.iter().all(|c| c.is_finite()));
@@ -106,7 +106,7 @@ impl Outcome {
     }
 }
 
-/// Runs all cases, prints what they did, and asserts that none blew up and that all but the softest came back.
+/// Runs all cases, prints their results, and asserts that all stay bounded and all but the softest recover.
 fn survive(what: &str, couplings: &[Coupling], run: impl Fn(&Case) -> Outcome) {
     let results: Vec<(Case, Outcome)> = cases(couplings).iter().map(|case| (*case, run(case))).collect();
     println!("{what}: {} blow-ups in {} runs", results.iter().filter(|r| r.1.blew_up()).count(), results.len());
@@ -157,7 +157,7 @@ fn scrambled_by_60_mm() {
     survive("scramble 60 mm", &[Coupling::Rigid], |case| scramble(case, 0.06));
 }
 
-/// Down by `depth` within 0.25 s, held, and up again.
+/// Press by `depth` within 0.25 s, hold, release.
 fn push(x: f64, depth: f64, seconds: f64) -> Point3<f64> {
     let share = (seconds / 0.25).min(1.0) - ((seconds - 0.45) / 0.15).clamp(0.0, 1.0);
     Point3::new(x, 0.03, top(x) + RADIUS_M + 1e-3 - (depth + 1e-3) * share)

@@ -1,4 +1,4 @@
-//! A slender beam of one element across: what each hexahedron makes of bending.
+//! A slender beam with one element across: bending of each kind of hexahedron.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod common;

@@ -121,8 +121,8 @@ fn a_held_tool_is_quiet() {
             let variance = forces.iter().map(|f| (f - mean).norm_squared()).sum::<f64>() / forces.len() as f64;
             let noise = variance.sqrt() / mean.norm();
             println!("E {e:.0e} coupled {coupled} mu {mu}: hold noise {noise:.1e} of the force");
-            // A very soft object under a rigid ball without friction sways sideways by tenths of a millimetre: nothing holds
-            // it there. Reported, not asserted (MATH.md, "Limits of contact").
+            // A very soft object under a rigid ball without friction sways sideways by tenths of a millimetre: no
+            // lateral force holds it. Reported, not asserted (MATH.md, "Limits of contact").
             if e > 1e3 || mu > 0.0 {
                 assert!(noise < 5e-4, "noise {noise}");
             }

@@ -13,7 +13,7 @@ fn end() -> Point3<f64> {
     Point3::new(0.05, 0.03, top(0.05)) + top_normal() * (RADIUS - 3e-3)
 }
 
-/// Settled skin offsets after the tool has gone to 3 mm depth in this way.
+/// Settled skin offsets after a press to 3 mm depth along this path.
 fn settled(approach: impl Fn(&mut Run)) -> Vec<Vector3<f64>> {
     let mut ball = ball(RADIUS);
     ball.max_tool_speed_m_per_s = 3.0;
@@ -66,7 +66,7 @@ fn a_pinch_of_two_tools_gains_no_energy() {
         pinch(&mut run, 0.5, &|s| 0.012 * s - 0.001, &|_| 0.0);
         pinch(&mut run, 0.5, &|_| 0.011, &|s| 0.004 * s);
         let held = pinch(&mut run, if e < 1e4 { 10.0 } else { 3.0 }, &|_| 0.011, &|_| 0.004);
-        // Tools that stand still do no work: the energy may only fall, up to noise.
+        // Tools at rest do no work: the energy may only fall, up to noise.
         let rise = held.windows(100).map(|w| w[99] - w[0]).fold(0.0, f64::max) / held[0];
         println!(
             "pinch E {e:.0e}: energy {:.3e} J, largest rise within 0.1 s {:.1e} of it, last {:.3e}",

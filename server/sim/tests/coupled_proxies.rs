@@ -1,4 +1,4 @@
-//! Tools on a spring: what a person with a device can do to the object, and the object to the person.
+//! Tools on a spring: forces from a device on the object, and back.
 #![allow(clippy::unwrap_used, reason = "a test that cannot build its scene should fail")]
 
 mod common;
@@ -98,8 +98,8 @@ fn a_device_pushed_through_the_object_is_stable_and_bounded() {
         );
         assert!(largest <= 20.0 + 1e-9);
         assert_eq!(run.state.rollbacks(), 0);
-        // 20 N on 1 kPa flattens the object onto its fixed floor: it never comes to rest there (MATH.md, "Limits of contact").
-        // Bounded and without roll-back is what is asserted then.
+        // 20 N on 1 kPa flattens the object onto its fixed floor without coming to rest (MATH.md, "Limits of contact").
+        // Asserted there: bounded motion, no roll-back.
         assert!(e < 1e4 || high - low < 0.02 * high, "the force still moves");
     }
 }

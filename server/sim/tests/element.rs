@@ -183,7 +183,7 @@ fn boundary_tractions(mesh: &HexMesh, stress: &Matrix3<f64>) -> Vec<Vector3<f64>
     out
 }
 
-/// Nodes that no boundary face touches.
+/// Nodes on no boundary face.
 fn is_interior(mesh: &HexMesh) -> Vec<bool> {
     let mut interior = vec![true; mesh.n_nodes()];
     mesh.boundary_quads().iter().flatten().for_each(|n: &NodeIdx| interior[n.index()] = false);
@@ -255,7 +255,7 @@ fn patch_passes_the_kernels_in_any_rotation() {
             let forces = elastic_forces(&model, &u);
             let inside: Vec<_> = forces.iter().zip(&interior).filter(|(_, i)| **i).map(|(f, _)| *f).collect();
             assert!(norms(&inside) < 2e-5 * norms(&forces), "{kind:?}: {:e} of {:e} N", norms(&inside), norms(&forces));
-            // The elements pull against what would hold this strain: f = -R (tractions).
+            // Elements pull against the tractions that hold this strain: f = -R (tractions).
             let errors: Vec<_> = forces.iter().zip(&expected).map(|(f, t)| f + rotation * t).collect();
             assert!(norms(&errors) < 2e-5 * norms(&forces), "{kind:?}: {:e} of {:e} N", norms(&errors), norms(&forces));
         }
@@ -313,8 +313,8 @@ fn skin_follows_the_rows_of_the_embedding() {
     }
 }
 
-/// Rows push nodes with the transpose of what moves the skin: what the tool loses the free block gains, momentum and moment of
-/// momentum alike.
+/// Rows push nodes with the transpose of the skin's mapping: the free block gains the momentum and angular momentum
+/// that the tool loses.
 #[test]
 fn push_of_a_tool_changes_momentum_by_force_times_time() {
     let h = 1e-4;

@@ -1,4 +1,4 @@
-//! What the ways to enrich do with examples whose truth is known. `-- --nocapture` prints the figures.
+//! Enrichment methods on examples with a known solution. `-- --nocapture` prints the figures.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod common;
@@ -10,7 +10,7 @@ use plica_sim::enrichment::*;
 
 const REGION: [[f64; 2]; 2] = [[0.02, 0.012], [0.08, 0.048]];
 
-static TAUGHT: LazyLock<Vec<Press>> = LazyLock::new(|| presses(48, 1, REGION));
+static TRAINING_SET: LazyLock<Vec<Press>> = LazyLock::new(|| presses(48, 1, REGION));
 static HELD_OUT: LazyLock<Vec<Press>> = LazyLock::new(|| presses(16, 2, REGION));
 static THIN_END: LazyLock<Vec<Press>> = LazyLock::new(|| presses(4, 3, [[0.1, 0.02], [0.11, 0.04]]));
 
@@ -18,7 +18,7 @@ fn default() -> EnrichmentOptions {
     EnrichmentOptions::default()
 }
 
-/// Nothing is lost in storage.
+/// Lossless storage.
 fn exact(interpolator: Interpolator, control_variate: bool) -> EnrichmentOptions {
     let field =
         FieldOptions { interpolator, control_variate, modes: usize::MAX, precision: Precision::F32, ..default().field };
@@ -58,12 +58,12 @@ fn median_error(bench: &mut Bench, presses: &[Press]) -> f64 {
 fn an_example_reproduces_itself_on_all_faces() {
     for interpolator in [Interpolator::Vector, Interpolator::Blend, Interpolator::Warp] {
         for control_variate in [false, true] {
-            let mut bench = Bench::new(&TAUGHT, exact(interpolator, control_variate));
+            let mut bench = Bench::new(&TRAINING_SET, exact(interpolator, control_variate));
             let mut worst: f64 = 0.0;
-            for i in (0..TAUGHT.len()).step_by(7) {
-                bench.reproduce(&TAUGHT, i);
-                let miss = bench.misses(&TAUGHT[i]).into_iter().fold(0.0, f64::max);
-                worst = worst.max(miss / largest(&TAUGHT[i]));
+            for i in (0..TRAINING_SET.len()).step_by(7) {
+                bench.reproduce(&TRAINING_SET, i);
+                let miss = bench.misses(&TRAINING_SET[i]).into_iter().fold(0.0, f64::max);
+                worst = worst.max(miss / largest(&TRAINING_SET[i]));
             }
             println!("{interpolator:?}, control variate {control_variate}: {worst:.1e} of the largest detail");
             assert!(worst < 1e-5, "{interpolator:?}: {worst:e}");
@@ -75,21 +75,21 @@ fn an_example_reproduces_itself_on_all_faces() {
 fn a_stamp_reproduces_its_example_as_its_texels_allow() {
     let of_texels = |coordinates, texels| {
         let field = FieldOptions { texels, ..exact(Interpolator::Stamp, false).field };
-        let mut bench = Bench::new(&TAUGHT, EnrichmentOptions { field, coordinates, ..default() });
+        let mut bench = Bench::new(&TRAINING_SET, EnrichmentOptions { field, coordinates, ..default() });
         let radius = 0.7 * bench.enricher.radius_m();
         let positions: Vec<_> = bench.model.description().skin.positions().to_vec();
         let error = |i: usize| {
-            bench.reproduce(&TAUGHT, i);
-            let mut misses = bench.misses(&TAUGHT[i]);
-            // The top: there the projection has a chart, too.
-            let centre = TAUGHT[i].touch.contact_point;
+            bench.reproduce(&TRAINING_SET, i);
+            let mut misses = bench.misses(&TRAINING_SET[i]);
+            // The top, where the projection has a chart too.
+            let centre = TRAINING_SET[i].touch.contact_point;
             for (miss, p) in misses.iter_mut().zip(&positions) {
                 let is_in_chart = (p - centre).norm() < radius && (p.z - common::top(p.x)).abs() < 1e-6;
                 *miss = if is_in_chart { *miss } else { 0.0 };
             }
-            bench.rms(&misses) / largest(&TAUGHT[i])
+            bench.rms(&misses) / largest(&TRAINING_SET[i])
         };
-        (0..TAUGHT.len()).step_by(5).map(error).fold(0.0, f64::max)
+        (0..TRAINING_SET.len()).step_by(5).map(error).fold(0.0, f64::max)
     };
     for texels in [32, 64, 128, 256] {
         let [geodesic, projected] = [Coordinates::Exponential, Coordinates::Orthogonal].map(|c| of_texels(c, texels));
@@ -105,7 +105,7 @@ fn a_stamp_reproduces_its_example_as_its_texels_allow() {
 #[test]
 fn the_default_beats_rescaling_and_ridge_on_unseen_presses() {
     let error = |name: &str, options| {
-        let error = median_error(&mut Bench::new(&TAUGHT, options), &HELD_OUT);
+        let error = median_error(&mut Bench::new(&TRAINING_SET, options), &HELD_OUT);
         println!("{name}: {error:.3}");
         error
     };
@@ -120,15 +120,15 @@ fn the_default_beats_rescaling_and_ridge_on_unseen_presses() {
 
 #[test]
 fn correlation_of_the_paper_as_printed_keeps_opposing_examples() {
-    let as_read = median_error(&mut Bench::new(&TAUGHT, paper(Interpolator::Vector, replication())), &HELD_OUT);
+    let as_read = median_error(&mut Bench::new(&TRAINING_SET, paper(Interpolator::Vector, replication())), &HELD_OUT);
     let literal = Ssh12Options { literal: true, ..replication() };
-    let mut bench = Bench::new(&TAUGHT, paper(Interpolator::Vector, literal));
+    let mut bench = Bench::new(&TRAINING_SET, paper(Interpolator::Vector, literal));
     let printed = median_error(&mut bench, &HELD_OUT);
     println!("on 1 - r {as_read:.3}, on r as printed {printed:.3}");
     assert!(as_read < 0.8 && printed > 1.0, "{as_read} {printed}");
-    // The state that is an example is not recognised: its detail comes from what is least like it.
-    bench.enrich(&TAUGHT[0], 1.0);
-    assert!(bench.relative_error(&TAUGHT[0]) > 0.9);
+    // An example's own state is not recognised: its detail comes from the least similar examples.
+    bench.enrich(&TRAINING_SET[0], 1.0);
+    assert!(bench.relative_error(&TRAINING_SET[0]) > 0.9);
 }
 
 #[test]
@@ -146,10 +146,10 @@ fn what_was_not_trained_stays_coarse() {
 #[test]
 fn without_deformation_there_is_no_detail() {
     for (name, correlator) in all_correlators() {
-        let mut bench = Bench::new(&TAUGHT, EnrichmentOptions { correlator, ..default() });
+        let mut bench = Bench::new(&TRAINING_SET, EnrichmentOptions { correlator, ..default() });
         bench.enrich(&HELD_OUT[0], 0.0);
         let most = bench.detail.iter().map(|d| size(d)).fold(0.0, f64::max);
-        // The position of the tool knows nothing of the deformation: that is what is wrong with it.
+        // The position of the tool carries no information on the deformation: the weakness of the method.
         assert_eq!(most == 0.0, name != "rbf", "{name}: {most}");
         bench.enrich(&HELD_OUT[0], 1e-6);
         assert!(bench.detail.iter().flatten().all(|c| c.is_finite()), "{name}");
@@ -159,13 +159,13 @@ fn without_deformation_there_is_no_detail() {
 #[test]
 fn examples_that_are_there_twice_change_little() {
     let mut random = common::Random(5);
-    let mut again = TAUGHT.clone();
+    let mut again = TRAINING_SET.clone();
     for u in again.iter_mut().flat_map(|press| press.displacements.iter_mut().flatten()) {
         *u *= 1.0 + 1e-4 * random.symmetric() as f32;
     }
-    let twice = [TAUGHT.clone(), again].concat();
+    let twice = [TRAINING_SET.clone(), again].concat();
     for (name, options) in [("default", default()), ("ssh12", paper(Interpolator::Vector, Ssh12Options::default()))] {
-        let once = median_error(&mut Bench::new(&TAUGHT, options), &HELD_OUT);
+        let once = median_error(&mut Bench::new(&TRAINING_SET, options), &HELD_OUT);
         let doubled = median_error(&mut Bench::new(&twice, options), &HELD_OUT);
         println!("{name}: {once:.3}, doubled {doubled:.3}");
         assert!((doubled - once).abs() < 0.1 * once.max(0.1), "{name}: {once} {doubled}");
@@ -174,7 +174,7 @@ fn examples_that_are_there_twice_change_little() {
 
 #[test]
 fn detail_moves_smoothly_with_the_contact_point() {
-    let mut bench = Bench::new(&TAUGHT, default());
+    let mut bench = Bench::new(&TRAINING_SET, default());
     let press = &HELD_OUT[0];
     bench.set(press, 1.0);
     let mut before: Vec<Vec<[f32; 4]>> = Vec::new();
@@ -205,12 +205,14 @@ fn detail_moves_smoothly_with_the_contact_point() {
 #[test]
 fn examples_that_do_not_fit_are_refused() {
     let model = scene().run().model;
-    let mut wrong = examples(&TAUGHT[..3]);
+    let mut wrong = examples(&TRAINING_SET[..3]);
     wrong.details[1].pop();
     let error = Enricher::new(&model, &wrong, default()).unwrap_err().to_string();
     assert!(error.contains("example 1") && error.contains("skin vertices"), "{error}");
-    assert!(Enricher::new(&model, &examples(&TAUGHT[..1]), default()).unwrap_err().to_string().contains("at least 2"));
-    let mut shorter = examples(&TAUGHT[..3]);
+    assert!(
+        Enricher::new(&model, &examples(&TRAINING_SET[..1]), default()).unwrap_err().to_string().contains("at least 2")
+    );
+    let mut shorter = examples(&TRAINING_SET[..3]);
     shorter.displacements.pop();
     assert!(Enricher::new(&model, &shorter, default()).is_err());
 }

@@ -11,7 +11,7 @@ use nalgebra::{Point3, Vector3};
 use plica_sim::Model;
 use plica_sim::enrichment::*;
 
-static TAUGHT: LazyLock<Vec<Press>> = LazyLock::new(|| presses(32, 1, [[0.02, 0.012], [0.08, 0.048]]));
+static TRAINING_SET: LazyLock<Vec<Press>> = LazyLock::new(|| presses(32, 1, [[0.02, 0.012], [0.08, 0.048]]));
 
 /// A run with enrichment after every tick.
 struct Enriched {
@@ -28,7 +28,7 @@ impl Enriched {
 
     fn with(n_tools: usize, options: EnrichmentOptions) -> Self {
         let model = (1..n_tools).fold(scene(), |scene, _| scene.tool(ball(RADIUS))).run().model;
-        let enricher = Enricher::new(&model, &examples(&TAUGHT), options).unwrap();
+        let enricher = Enricher::new(&model, &examples(&TRAINING_SET), options).unwrap();
         let run = Run::new(model);
         let live = LiveEnrichment::new(&run.model, Arc::new(enricher));
         let skin = vec![[0.0; 3]; run.model.n_skin()];
@@ -37,7 +37,7 @@ impl Enriched {
         this
     }
 
-    /// A tick with the tools at these places; the skin before and after it.
+    /// A tick with the tools at these poses; the skin before and after it.
     fn tick(&mut self, places: &[Point3<f64>]) {
         let poses: Vec<_> = places.iter().enumerate().map(|(tool, p)| (tool, at(*p))).collect();
         self.run.tick(&poses);
@@ -91,7 +91,7 @@ fn detail_follows_a_press_and_is_held_at_release() {
     it.glide(deep(0.05, 0.03, 0.005), deep(0.05, 0.03, 0.005), 100, |_| ());
     let pressed = it.detail();
     assert!(pressed > 1e-3 && it.live.least_confidence() > 0.9 && it.live.confidence(0) > 0.9, "{pressed}");
-    // Away at once: the coarse skin takes a while to recover, and detail goes with it, without a step of its own.
+    // Sudden release: the coarse skin recovers over time, and detail fades with it, without a step of its own.
     let away = Point3::new(0.05, 0.03, 0.2);
     let (mut previous, mut most_drop, mut ticks) = (pressed, 0.0_f64, 0);
     while it.detail() > 0.01 * pressed && ticks < 3000 {
@@ -115,7 +115,7 @@ fn a_window_hands_over_to_another_place_without_a_jump() {
     let mut it = Enriched::new(1);
     it.glide(deep(0.035, 0.03, 0.0), deep(0.035, 0.03, 0.005), 200, |_| ());
     let own = it.detail();
-    // Jumps to another place, where it touches the skin that still recovers.
+    // Jumps to another contact point on the recovering skin.
     let mut largest: f64 = 0.0;
     it.glide(deep(0.065, 0.03, 0.0005), deep(0.065, 0.03, 0.005), 200, |it| largest = largest.max(it.change()));
     println!("{:.2} mm of detail, largest change in a tick {:.2} mm", 1e3 * own, 1e3 * largest);
@@ -166,7 +166,8 @@ fn windows_come_and_go_without_a_jump() {
         let coarse = it.coarse();
         it.skin.iter().zip(coarse).map(|(s, c)| std::array::from_fn(|k| s[k] - c[k])).collect()
     };
-    // The first tool rests in the skin; the second comes, goes, and comes again elsewhere while its window is still held.
+    // The first tool rests in the skin; the second makes contact, leaves, and returns elsewhere while its window is
+    // still held.
     let second = |k: i32| match k {
         400..600 => deep(0.065, 0.04, 0.003 * f64::from(k - 400) / 200.0),
         650..850 => deep(0.065, 0.022, 0.003 * f64::from(k - 650) / 200.0),
@@ -187,7 +188,7 @@ fn windows_come_and_go_without_a_jump() {
         (before, coarse_before) = (now, coarse_now);
     }
     println!("largest change of its own {:.0} um of {:.2} mm, tick {}", 1e6 * most.0, 1e3 * largest, most.1);
-    // What the tool kept clear comes back in the tick in which it is taken away.
+    // Detail at vertices kept clear returns in the tick in which the tool leaves.
     assert!(most.0 < 0.1 * largest, "{most:?} of {largest}");
 }
 
@@ -242,14 +243,14 @@ fn the_same_twice_is_the_same() {
 #[test]
 fn an_enricher_knows_its_model() {
     let model = scene().run().model;
-    let enricher = Enricher::new(&model, &examples(&TAUGHT), EnrichmentOptions::default()).unwrap();
+    let enricher = Enricher::new(&model, &examples(&TRAINING_SET), EnrichmentOptions::default()).unwrap();
     assert!(enricher.fits(&model));
     let other: Model = common::Scene::block(common::E, 0.45).run().model;
     assert!(!enricher.fits(&other));
 }
 
-/// A running simulation puts on the skin what an evaluation of the same state measures, by whatever method: to 0.1 um, but for
-/// the vertices that the tool keeps out.
+/// The detail of a running simulation equals an evaluation of the same state, for every method: to 0.1 um, except
+/// vertices moved by the clearance.
 #[test]
 fn every_method_serves_what_it_is_measured_by() {
     let axes = [Vector3::x(), Vector3::y()];
@@ -258,7 +259,7 @@ fn every_method_serves_what_it_is_measured_by() {
         it.glide(deep(0.05, 0.03, 0.0), deep(0.05, 0.03, 0.005), 100, |_| ());
         it.live.forget();
         it.tick(&[deep(0.05, 0.03, 0.005)]);
-        let mut bench = Bench::new(&TAUGHT, method.options(axes));
+        let mut bench = Bench::new(&TRAINING_SET, method.options(axes));
         let confidence = bench.enrich(&press_of(&it.run), 1.0);
         let centre = Point3::from(it.run.state.tools()[0].proxy.translation.vector).cast::<f32>();
         let (mut largest, mut worst, mut compared) = (0.0_f64, 0.0_f64, 0);

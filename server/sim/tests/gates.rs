@@ -68,7 +68,7 @@ fn spoilt_state_is_rolled_back_counted_and_goes_on() {
                 let after = run.state.node_displacements(&run.model);
                 assert!(after == before, "{value} {everywhere}: not the last good state");
                 assert!(run.state.node_velocities(&run.model).iter().all(|v| v.norm() == 0.0));
-                // Long enough apart that each roll-back counts as the first.
+                // Far enough apart in time that each roll-back counts as the first.
                 run.hold(pressed(3e-3), 0.1, |run, report| assert!(!report.rolled_back && is_finite(run)));
             }
         }
@@ -81,7 +81,7 @@ fn spoilt_state_is_rolled_back_counted_and_goes_on() {
     }
 }
 
-/// The last good state the first time; when it relapses, that state or the rest shape.
+/// The last good state at the first roll-back; that state or the rest shape at a second one.
 #[test]
 fn gate_holds_tick_after_tick() {
     let mut run = pressing(Coupling::Rigid);
@@ -124,7 +124,7 @@ fn refused_pose_changes_nothing() {
     }
 }
 
-/// Neither what happened after the snapshot nor what the workspace held may show.
+/// A restored state does not depend on events after the snapshot or on the workspace.
 #[test]
 fn snapshot_brings_back_every_bit() {
     let mut run = pressing(Coupling::Spring(SpringCoupling::default()));

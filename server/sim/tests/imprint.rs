@@ -1,4 +1,4 @@
-//! The shape that a pressed ball leaves must not know of Young's modulus, the time step, or how contact was solved.
+//! The imprint of a ball is independent of Young's modulus, the time step and the contact solver.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod common;
@@ -12,7 +12,7 @@ use reference::ball::Ball;
 const DEPTH_M: f64 = 5e-3;
 const POISSON_RATIO: f64 = 0.45;
 
-/// Where a ball is when it is `depth` below the top, at x = 50 mm, y = 30 mm.
+/// Position of a ball `depth` below the top, at x = 50 mm, y = 30 mm.
 fn pressed(radius: f64, depth: f64) -> Point3<f64> {
     Point3::new(0.05, 0.03, top(0.05)) + top_normal() * (radius - depth)
 }

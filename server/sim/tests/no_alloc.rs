@@ -1,4 +1,4 @@
-//! Nothing is allocated or freed in a tick, whatever happens in it.
+//! No tick allocates or frees, in any situation.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod common;
@@ -77,18 +77,18 @@ fn pose(k: usize, n: usize) -> Isometry3<f64> {
     turned(p, Vector3::new(0.1 * t.sin(), 0.2, 0.0))
 }
 
-/// Half of the coarse offset taken back, in a dozen states of the crowd.
+/// Half of the coarse offset removed, in a dozen states with many tools.
 fn enrichment(run: &Run) -> LiveEnrichment {
-    let mut taught = crowded(false);
+    let mut trained = crowded(false);
     let mut examples = Examples::default();
     for n in 0..600 {
-        taught.tick(&[0, 1, 2, 3].map(|k| (k, pose(k, n))));
-        let reading = taught.state.tools()[0];
+        trained.tick(&[0, 1, 2, 3].map(|k| (k, pose(k, n))));
+        let reading = trained.state.tools()[0];
         if n % 50 == 49 && reading.in_contact {
             let to_f32 = |v: &Vector3<f64>, share: f64| (v * share).cast::<f32>().into();
-            let u = taught.state.node_displacements(&taught.model);
+            let u = trained.state.node_displacements(&trained.model);
             examples.displacements.push(u.iter().map(|u| to_f32(u, 1.0)).collect());
-            examples.details.push(taught.offsets().iter().map(|o| to_f32(o, -0.5)).collect());
+            examples.details.push(trained.offsets().iter().map(|o| to_f32(o, -0.5)).collect());
             let tool_origin = reading.proxy.translation.vector.into();
             examples.touches.push(Touch { contact_point: reading.reference_contact_point_m, tool_origin });
         }

@@ -1,4 +1,4 @@
-//! From device poses to the tool's pose in each tick: frames, ring, sampling, jumps, staleness, and what is refused.
+//! From device poses to the tool's pose in each tick: frames, ring, sampling, jumps, staleness, refusals.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod common;
@@ -65,7 +65,7 @@ fn latest_pose_is_approached_at_the_allowed_speed() {
     for _ in 0..15 {
         tick_with(&mut run, &[]);
     }
-    // 8 mm in 16 ms: as fast as it may be, so it is followed, half a millimetre per tick.
+    // 8 mm in 16 ms: at the speed limit, so it is followed, half a millimetre per tick.
     let start = x(&run);
     tick_with(&mut run, &[sample(0.016, along(0.008))]);
     for k in 1..=18 {
@@ -144,7 +144,7 @@ struct Tracker {
 
 impl Tracker {
     const LEAST_LATENCY_S: f64 = 2e-3;
-    /// Its first sample (a source time of 0 would say that it knows none) [s].
+    /// Time of its first sample, not 0, which means unknown [s].
     const START_S: f64 = 10.0;
 
     /// A tracker whose first sample is taken when the caller's clock says `clock_s`.
@@ -227,7 +227,7 @@ fn ring_holds_sixteen_samples() {
     assert!((x(&run) - 4e-3).abs() < 1e-12, "the oldest of the last 16 is 4, the tool is at {}", x(&run));
 }
 
-/// Two sides of the object, seen at 250 Hz: what lies between them is not swept.
+/// Two sides of the object, seen at 250 Hz: no sweep between them.
 #[test]
 fn jump_is_not_swept_when_interpolating() {
     let mut tool = ball(0.01);
@@ -270,7 +270,7 @@ fn source_that_starts_its_clock_again_is_interpolated_again() {
     assert!(worst <= 0.3 * H + 1e-9, "{worst} m off the delayed device");
 }
 
-/// Where a source does not know its time, the time of arrival stands in, whatever the caller's clock says.
+/// Without a source time the time of arrival is used, for any offset of the caller's clock.
 #[test]
 fn source_without_a_clock_is_interpolated_by_arrival() {
     let mut run = scene(|t| t.sampling = Sampling::Interpolate { delay_s: 0.030 });
@@ -374,7 +374,7 @@ fn invalid_sample_is_no_news() {
     }
 }
 
-/// The formula as it is published, and the place where a tick puts a rigid tool.
+/// The formula as published, and the pose of a rigid tool after a tick.
 #[test]
 fn a_tracked_pose_is_scaled_between_tracker_and_marker() {
     let mut tool = ball(0.01);

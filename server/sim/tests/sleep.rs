@@ -1,4 +1,4 @@
-//! An object at rest with no tool near is not solved, and nobody can tell from the shape.
+//! An object at rest with no tool near is not solved, without effect on its shape.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod common;
@@ -162,7 +162,7 @@ fn block_that_rests_on_a_plane_sleeps_and_wakes_without_a_start() {
     );
     assert!(run.state.sleeping(), "still awake after 6 s");
     let before = run.skin();
-    // Near enough to wake it, not to touch it.
+    // Near enough to wake the object, without contact.
     let near = Point3::new(0.02, 0.02, 0.02 + RADIUS_M + 2e-3);
     run.glide(far, near, 0.5, |_, _| {});
     run.hold(near, 0.3, |_, _| {});

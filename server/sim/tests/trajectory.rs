@@ -39,7 +39,7 @@ impl Deviation {
     }
 }
 
-/// Both set going from the same displacements at rest, without tools.
+/// Both start from the same displacements at rest, without tools.
 fn deviation(scene: Scene, start: impl Fn(&Point3<f64>) -> Vector3<f64>, seconds: f64) -> Deviation {
     let mut reference = Reference::new(&scene.description);
     let mut run = scene.run();

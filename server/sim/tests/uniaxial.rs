@@ -1,4 +1,4 @@
-//! The material law that the corotated kernels amount to in a pulled or pressed bar: `P = E (lambda - 1)`,
+//! Effective material law of the corotated kernels in a bar under tension or compression: `P = E (lambda - 1)`,
 //! `J = lambda (1 - nu (lambda - 1))^2`.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
@@ -22,9 +22,19 @@ fn bar(poisson_ratio: f64, element: ElementKind) -> Model {
     }))
 }
 
+/// Stretch ratios of a bar.
+struct BarStretch {
+    /// `lambda`
+    axial: f64,
+    /// `s`
+    lateral: f64,
+}
+
 /// Forces at the nodes of the homogeneous deformation `x = R diag(lambda, s, s) X`, turned back by `R` [N].
-fn forces(model: &Model, (lambda, s): (f64, f64), rotation: &Rotation3<f64>) -> Vec<Vector3<f64>> {
-    let gradient = rotation.matrix() * Matrix3::from_diagonal(&Vector3::new(lambda, s, s)) - Matrix3::identity();
+fn forces(model: &Model, stretch: BarStretch, rotation: &Rotation3<f64>) -> Vec<Vector3<f64>> {
+    let BarStretch { axial, lateral } = stretch;
+    let stretches = Vector3::new(axial, lateral, lateral);
+    let gradient = rotation.matrix() * Matrix3::from_diagonal(&stretches) - Matrix3::identity();
     let u: Vec<_> = model.description().mesh.nodes().iter().map(|x| gradient * x.coords).collect();
     elastic_forces(model, &u).iter().map(|f| rotation.inverse() * f).collect()
 }
@@ -35,9 +45,9 @@ fn on_face(model: &Model, forces: &[Vector3<f64>], axis: usize) -> Vector3<f64> 
     nodes.iter().zip(forces).filter(|(x, _)| x[axis] > BAR_M[axis] - 1e-9).map(|(_, f)| *f).sum()
 }
 
-/// The lateral stretch at which the lateral faces pull with nothing, by the secant rule.
+/// Lateral stretch at which the lateral faces are free of traction, by the secant method.
 fn free_lateral_stretch(model: &Model, lambda: f64, rotation: &Rotation3<f64>) -> f64 {
-    let pull = |s: f64| on_face(model, &forces(model, (lambda, s), rotation), 1).y;
+    let pull = |s: f64| on_face(model, &forces(model, BarStretch { axial: lambda, lateral: s }, rotation), 1).y;
     let (mut a, mut b) = (1.0, 1.0 - 0.4 * (lambda - 1.0));
     let (mut pull_a, mut pull_b) = (pull(a), pull(b));
     for _ in 0..6 {
@@ -61,7 +71,8 @@ fn bar_follows_the_linear_corotational_law() {
                 let s = free_lateral_stretch(&model, lambda, &rotation);
                 let volume = lambda * (1.0 - nu * (lambda - 1.0)).powi(2);
                 worst_volume = worst_volume.max((lambda * s * s / volume - 1.0).abs());
-                let forces = forces(&model, (lambda, 1.0 - nu * (lambda - 1.0)), &rotation);
+                let stretch = BarStretch { axial: lambda, lateral: 1.0 - nu * (lambda - 1.0) };
+                let forces = forces(&model, stretch, &rotation);
                 let pull = E * (lambda - 1.0) * BAR_M[1] * BAR_M[2];
                 worst_stress = worst_stress.max((-on_face(&model, &forces, 0).x / pull - 1.0).abs());
                 let nodes = model.description().mesh.nodes();

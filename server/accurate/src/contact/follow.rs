@@ -13,9 +13,9 @@ use super::state::ContactState;
 use crate::newton::{Progress, Solver};
 
 impl Press<'_> {
-    /// Moves the tool from where it is in `state` through the poses of `path` and solves for equilibrium on the way; friction
-    /// depends on the path. `x: [n_nodes]` \[m\] and `state` are carried along; both start as an equilibrium, for instance
-    /// at rest and untouched. `solver` was made for the same energies and constraints.
+    /// Moves the tool from its pose in `state` through the poses of `path`, in equilibrium; friction
+    /// depends on the path. `x: [n_nodes]` \[m\] and `state` are updated; both start in equilibrium, for instance at
+    /// rest without contact. `solver` was made for the same energies and constraints.
     ///
     /// # Errors
     /// See [`ContactError`].
@@ -40,7 +40,7 @@ impl Press<'_> {
     }
 }
 
-/// A press under way.
+/// State of a running press.
 struct Run<'a> {
     press: &'a Press<'a>,
     solver: &'a mut Solver,

@@ -10,7 +10,7 @@ use crate::hessian::Hessian;
 /// Friction of one contact point, constant during a solve for positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionRow {
-    /// `a`: where the point would be if it had not slid \[m\].
+    /// `a`: position of the point without sliding \[m\].
     pub anchor: Point3<f64>,
     /// `n`: unit normal of the obstacle.
     pub normal: Vector3<f64>,

@@ -18,13 +18,13 @@ const LEFT_TO_NEXT: f64 = 0.3;
 /// Factors on the tolerances of pressures and forces in increments that end between two waypoints.
 const ON_THE_WAY: [f64; 2] = [3.0, 100.0];
 
-/// An increment under way.
+/// State of a running increment.
 pub(super) struct Increment<'a> {
     press: &'a Press<'a>,
     pose: Isometry3<f64>,
     pressure_tolerance: f64,
     newton_tolerance: f64,
-    /// `[n_points]`, and so all below.
+    /// `[n_points]`, like all arrays below.
     penalties: Vec<f64>,
     friction_penalties: Vec<f64>,
     pressures: Vec<f64>,
@@ -123,8 +123,8 @@ impl<'a> Increment<'a> {
         Err(Failure::Unsettled(fit))
     }
 
-    /// The tool is at the pose now. A point that sticks keeps its anchor; one that slides gets the anchor that its traction
-    /// belongs to \[SH98, ch. 2\].
+    /// Moves the state's tool to the pose. A sticking point keeps its anchor; a sliding point gets the anchor of its
+    /// traction \[SH98, ch. 2\].
     pub(super) fn commit(&self, x: &[Vector3<f64>], state: &mut ContactState) {
         let multipliers = self.press.surface.continuous_part(&self.tractions);
         for (q, row) in self.rows.iter().enumerate() {
@@ -143,8 +143,8 @@ impl<'a> Increment<'a> {
         state.tractions_pa.copy_from_slice(&self.tractions);
     }
 
-    /// The continuous parts of pressures and tractions become multipliers. Friction acts along the present tangent planes,
-    /// under the present pressures.
+    /// Sets multipliers to the continuous parts of pressures and tractions; friction acts along the present tangent
+    /// planes, under the present pressures.
     fn update_multipliers(&mut self, x: &[Vector3<f64>]) {
         let Press { surface, obstacle, friction, .. } = *self.press;
         self.multipliers = surface.continuous_part(&self.pressures);
@@ -173,7 +173,7 @@ impl<'a> Increment<'a> {
         let friction = Friction { surface, rows: &self.rows, penalties_pa_per_m: &self.friction_penalties };
         let mut energies: Vec<&dyn Energy> = self.press.energies.to_vec();
         energies.extend([&normal as &dyn Energy, &friction]);
-        // To a tolerance of 1, so that forces count as rounding only where they are.
+        // With tolerance 1 the floor of the residual is rounding alone.
         let first = solver.residual(&energies, constraints, 1.0, x);
         let tolerance = tolerance(first).max(self.newton_tolerance);
         let newton = Params { tolerance, max_iterations: params.max_newton_iterations };

@@ -3,7 +3,7 @@
 /// Parameters of the contact solver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactParams {
-    /// The solid's Young's modulus, or one of that size \[Pa\]: the scale of penalties.
+    /// Young's modulus of the solid, or its order of magnitude \[Pa\]: the scale of penalties.
     pub young_modulus_pa: f64,
     /// Longest motion of the tool in one increment \[m\].
     pub max_increment_m: f64,
@@ -16,11 +16,11 @@ pub struct ContactParams {
     pub pressure_tolerance: f64,
     /// Largest force left at a free coordinate, as a share of the largest nodal force of any single energy.
     pub newton_tolerance: f64,
-    /// Updates of the multipliers after which an increment is given up.
+    /// Largest number of multiplier updates in an increment.
     pub max_updates: u32,
-    /// Newton steps between two updates after which an increment is given up.
+    /// Largest number of Newton steps between two updates.
     pub max_newton_iterations: u32,
-    /// Halvings of a failed increment after which the press fails.
+    /// Largest number of halvings of a failed increment.
     pub max_halvings: u32,
 }
 

@@ -26,7 +26,7 @@ pub struct Press<'a> {
 }
 
 impl Press<'_> {
-    /// Farthest that a motion of the tool carries its origin or a point that it may be touching \[m\].
+    /// Longest path of the tool's origin or of a possible contact point in a motion of the tool \[m\].
     pub(super) fn motion_m(&self, from: &Isometry3<f64>, to: &Isometry3<f64>, x: &[Vector3<f64>]) -> f64 {
         let is_near = |p: &Point3<f64>| {
             [from, to].iter().any(|pose| self.obstacle.distance(pose, p) < self.params.max_increment_m)

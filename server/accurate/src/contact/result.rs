@@ -42,7 +42,7 @@ pub struct ContactInfo {
 /// Progress, reported before every Newton step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactProgress {
-    /// Share of the path that the present increment ends at.
+    /// Share of the path at the end of the present increment.
     pub share: f64,
     /// Increments solved.
     pub increments: u32,
@@ -56,27 +56,27 @@ pub enum ContactError {
     /// Cancelled by the callback.
     #[error("cancelled at {:.0} % of the path", 100.0 * share)]
     Cancelled {
-        /// Share of the path that was reached.
+        /// Share of the path completed.
         share: f64,
     },
     /// A solve failed, even in small increments.
     #[error("at {:.0} % of the path, in an increment halved {halvings} times: {source}", 100.0 * share)]
     Solve {
-        /// Share of the path that was reached.
+        /// Share of the path completed.
         share: f64,
         /// Halvings.
         halvings: u32,
         /// Cause.
         source: SolveError,
     },
-    /// Pressures and friction do not come to rest, even in small increments.
+    /// Pressures and friction do not converge, even in small increments.
     #[error(
         "at {:.0} % of the path, in an increment halved {halvings} times: update {max_updates} still changes pressures by \
          {pressure_change:.1e} and tractions by {traction_change:.1e} of the largest pressure",
         100.0 * share
     )]
     Unsettled {
-        /// Share of the path that was reached.
+        /// Share of the path completed.
         share: f64,
         /// Halvings.
         halvings: u32,

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use super::obstacle::Obstacle;
 use super::surface::ContactSurface;
 
-/// Halvings of the stretch in which a point meets the obstacle.
+/// Bisections of the interval in which a point meets the obstacle.
 const TOUCH_HALVINGS: u32 = 40;
 
 /// Pressures, tractions and anchors of all contact points, at one pose of the tool.
@@ -14,12 +14,12 @@ pub struct ContactState {
     pub(super) pose: Isometry3<f64>,
     pub(super) pressures_pa: Vec<f64>,
     pub(super) tractions_pa: Vec<Vector3<f64>>,
-    /// Where each point holds to the tool, in the tool's frame; where there is no contact, where the point is \[m\].
+    /// Anchor of each point, in the tool's frame; without contact the position of the point \[m\].
     pub(super) anchors: Vec<Point3<f64>>,
 }
 
 impl ContactState {
-    /// Nothing touched, the tool at `pose`, nodes at `x: [n_nodes]` \[m\].
+    /// State without contact: tool at `pose`, nodes at `x: [n_nodes]` \[m\].
     pub fn untouched(surface: &ContactSurface, pose: &Isometry3<f64>, x: &[Vector3<f64>]) -> Self {
         let points = surface.points();
         Self {
@@ -45,10 +45,10 @@ impl ContactState {
         &self.tractions_pa
     }
 
-    /// Where each point holds to the tool when that is at `pose` \[m\], in world coordinates.
+    /// Anchors when the tool is at `pose`, in world coordinates \[m\].
     ///
-    /// A point in contact keeps its anchor. One that is not, and that the moving tool meets while the point stays where it
-    /// is, holds from where they meet; one that is not met, from where it is.
+    /// A point in contact keeps its anchor. A point that the moving tool meets, the point being at rest, is anchored
+    /// where they meet; every other point at its position.
     pub(super) fn anchors_at(&self, pose: &Isometry3<f64>, obstacle: &Obstacle) -> Vec<Point3<f64>> {
         let anchor = |(anchor, pressure): (&Point3<f64>, &f64)| {
             let met = if *pressure > 0.0 { *anchor } else { self.meet(anchor, pose, obstacle) };
@@ -57,7 +57,7 @@ impl ContactState {
         self.anchors.iter().zip(&self.pressures_pa).map(anchor).collect()
     }
 
-    /// Where the tool, on its way to `pose`, meets a point that stays; in the tool's frame.
+    /// Position at which the tool, moving to `pose`, meets a point at rest; in the tool's frame.
     fn meet(&self, start: &Point3<f64>, pose: &Isometry3<f64>, obstacle: &Obstacle) -> Point3<f64> {
         let end = pose.inverse_transform_point(&(self.pose * start));
         let distance = |p: &Point3<f64>| obstacle.distance(&Isometry3::identity(), p);

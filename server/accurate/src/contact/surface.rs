@@ -17,7 +17,7 @@ pub struct ContactPoint {
     pub nodes: [NodeIdx; 4],
     /// `N_a`; they sum to 1.
     pub shares: [f64; 4],
-    /// Reference area that the point stands for \[m^2\].
+    /// Reference area of the point \[m^2\].
     pub area_m2: f64,
     /// Square root of the face's reference area \[m\].
     pub size_m: f64,
@@ -40,7 +40,7 @@ pub(super) trait FieldValue:
 impl FieldValue for f64 {}
 impl FieldValue for Vector3<f64> {}
 
-/// The 2 x 2 Gauss points of faces. Each lies in the stencil of one element, so contact adds nothing to its pattern.
+/// The 2 x 2 Gauss points of faces. Each lies in the stencil of one element, so contact adds no entries to the pattern.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactSurface {
     points: Vec<ContactPoint>,

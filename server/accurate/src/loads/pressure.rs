@@ -9,8 +9,8 @@ use crate::hessian::Hessian;
 
 /// A pressure `p` against faces of the deformed surface: `f_a = -int N_a p n da`, `n` outward.
 ///
-/// It has no potential unless the faces are closed, and is treated as if it had none. The symmetric part of its derivative
-/// is the exact Hessian; being indefinite by nature, it is left out of a projected one.
+/// It has a potential only on closed faces, and is always treated as having none. The symmetric part of its derivative
+/// is the exact Hessian; it is indefinite, and a projected Hessian leaves it out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pressure {
     quads: Vec<[NodeIdx; 4]>,

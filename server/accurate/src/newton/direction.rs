@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::{Info, Problem, SolveError, Solver, clear_given, dot, gmres};
+use super::report::{Info, SolveError};
+use super::{Problem, Solver, clear_given, dot, gmres};
 use crate::energy::Projection;
 
 /// First shift of a matrix that stays indefinite, as a share of its mean diagonal; every further one is ten times larger.

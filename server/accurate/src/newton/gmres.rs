@@ -6,10 +6,10 @@ use nalgebra::{DMatrix, DVector, Vector3};
 const TOLERANCE: f64 = 1e-8;
 const MAX_ITERATIONS: usize = 60;
 
-/// Solves `(H + R) d = b` for `d`, which comes in as `H^-1 b`; `apply(v, out)` is `out = H^-1 R v` \[Saad03, alg. 6.9\].
+/// Solves `(H + R) d = b` for `d`, which starts as `H^-1 b`; `apply(v, out)` is `out = H^-1 R v` \[Saad03, alg. 6.9\].
 ///
-/// `R` lives on the loaded faces, and is small against `H` short of an instability: a few iterations do. Should they not,
-/// `d` is the best of the directions found.
+/// `R` acts on the loaded faces and is small against `H` short of an instability, so that a few iterations suffice. If
+/// they do not, `d` is the best direction found.
 pub(super) fn solve(d: &mut [Vector3<f64>], mut apply: impl FnMut(&[Vector3<f64>], &mut [Vector3<f64>])) {
     let size = norm(d);
     if size == 0.0 {

@@ -2,8 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::sufficient_decrease::{Judgement, Start, Total};
-use super::{Info, Problem, Residual, Solver, dot};
+use super::report::Info;
+use super::sufficient_decrease::{Decision, Start, Total};
+use super::{Problem, Residual, Solver, dot};
 
 /// Largest slope after a step, as a share of the first, where energy differences are rounding \[HZ05\].
 const SLOPE_LEFT: f64 = 0.9;
@@ -46,10 +47,10 @@ impl Solver {
         let mut length = 1.0;
         for _ in 0..=MAX_HALVINGS {
             self.try_step(x, length);
-            let accepted = match start.judge(&Total::of(problem.energies, &self.trial), length) {
-                Judgement::Accept => true,
-                Judgement::Refuse => false,
-                Judgement::AskForces => self.is_better_by_forces(problem, &start),
+            let accepted = match start.decide(&Total::of(problem.energies, &self.trial), length) {
+                Decision::Accept => true,
+                Decision::Reject => false,
+                Decision::Undecided => self.is_better_by_forces(problem, &start),
             };
             if accepted {
                 x.copy_from_slice(&self.trial);

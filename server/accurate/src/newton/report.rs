@@ -7,7 +7,7 @@ use crate::factor::FactorError;
 pub struct Params {
     /// Largest force left at a free coordinate, as a share of the largest nodal force of any single energy.
     pub tolerance: f64,
-    /// Newton steps after which the solve gives up.
+    /// Largest number of Newton steps.
     pub max_iterations: u32,
 }
 

@@ -9,7 +9,7 @@ const SUFFICIENT_DECREASE: f64 = 1e-4;
 /// Share of the energies below which their differences are rounding.
 const ROUNDING: f64 = 1e-13;
 
-/// Sum of energies, and of their magnitudes \[J\].
+/// Sum of energies and sum of their magnitudes \[J\].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Total {
     pub(super) value: f64,
@@ -26,7 +26,7 @@ impl Total {
     }
 }
 
-/// Where a line search begins.
+/// Start of a line search.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Start {
     pub(super) total: Total,
@@ -39,27 +39,27 @@ pub(super) struct Start {
     pub(super) has_potential: bool,
 }
 
-/// decision on a step by energy differences.
+/// Decision on a step length by energy differences.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Judgement {
+pub(super) enum Decision {
     Accept,
-    Refuse,
-    /// Undecided: the difference is rounding, or includes work of a load without a potential.
-    AskForces,
+    Reject,
+    /// The difference is rounding, or includes work of a load without a potential: forces decide.
+    Undecided,
 }
 
 impl Start {
-    pub(super) fn judge(&self, trial: &Total, length: f64) -> Judgement {
+    pub(super) fn decide(&self, trial: &Total, length: f64) -> Decision {
         let rounding = ROUNDING * (self.total.magnitude + self.slope.abs());
         let change = trial.value - self.total.value + length * self.frozen_work;
         if !trial.value.is_finite() {
-            Judgement::Refuse
+            Decision::Reject
         } else if change <= SUFFICIENT_DECREASE * length * self.slope {
-            Judgement::Accept
+            Decision::Accept
         } else if self.has_potential && change > rounding {
-            Judgement::Refuse
+            Decision::Reject
         } else {
-            Judgement::AskForces
+            Decision::Undecided
         }
     }
 }

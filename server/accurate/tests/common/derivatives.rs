@@ -9,7 +9,7 @@ const TOLERANCE: f64 = 1e-7;
 /// Checks at `x`, moving nodes by up to 2e-4 of `length_m` \[m\]:
 ///
 /// * the gradient is the derivative of the value, and the Hessian that of the gradient;
-/// * the projected Hessian is positive semi-definite, and exceeds the exact one by something positive semi-definite;
+/// * the projected Hessian is positive semi-definite, and exceeds the exact one by a positive semi-definite matrix;
 /// * of loads without a potential: Hessian and remainder are together the derivative of the gradient.
 pub fn check_derivatives(name: &str, energy: &dyn Energy, x: &[Vector3<f64>], length_m: f64) {
     let step = 1e-4 * length_m;

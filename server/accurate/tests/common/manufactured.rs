@@ -1,4 +1,4 @@
-//! A solution that is known: a smooth displacement, the body force that makes it an equilibrium, and distances from it.
+//! Manufactured solution: a smooth displacement, its body force, and errors against it.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use plica_accurate::{Constraints, Material, NodalForces, Params, Solid};

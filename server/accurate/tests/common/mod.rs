@@ -1,4 +1,4 @@
-//! What the tests of the accurate solver share.
+//! Bodies and helpers shared by the tests of the accurate solver.
 #![allow(dead_code, unreachable_pub, reason = "every test file uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 

@@ -1,4 +1,4 @@
-//! Numbers that are the same in every run.
+//! Reproducible random numbers.
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -1,4 +1,4 @@
-//! What the contact tests share: bodies held at the bottom, tools, presses.
+//! Shared by the contact tests: bodies held at the bottom, tools, presses.
 #![allow(dead_code, unreachable_pub, reason = "every test file uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
@@ -12,7 +12,7 @@ use plica_accurate::{Constraints, Energy, Material, MaterialModel, Solid, Solver
 use plica_geometry::shapes::block;
 use plica_geometry::{ConvexPolytope, HexMesh, NodeIdx};
 
-/// A solid that is held somewhere, and the faces where it may be touched.
+/// A solid with supports, and its contact faces.
 pub struct Body {
     pub mesh: HexMesh,
     pub solid: Solid,
@@ -23,7 +23,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// Nodes at z = 0 are held; any boundary face that is not held may be touched.
+    /// Nodes at z = 0 are held; all other boundary faces are contact faces.
     pub fn held_below(mesh: HexMesh, material: Material) -> Self {
         let mut constraints = Constraints::none(mesh.n_nodes());
         for (node, position) in mesh.nodes().iter().enumerate().filter(|(_, p)| p.z < 1e-9) {
@@ -94,7 +94,7 @@ impl Body {
     }
 }
 
-/// What presses, and how that is solved.
+/// Tool and parameters of a press.
 #[derive(Clone)]
 pub struct Tool {
     pub shape: Obstacle,
@@ -132,7 +132,7 @@ impl Tool {
         Self::new(Obstacle::Polytope(ConvexPolytope::cuboid(half_extents_m).unwrap()), friction)
     }
 
-    /// The same, solved as exactly as the tests that compare forces need.
+    /// The same with tolerances for tests that compare forces.
     pub fn exactly(mut self) -> Self {
         self.params.pressure_tolerance = 1e-4;
         self.params.newton_tolerance = 1e-8;

@@ -85,8 +85,8 @@ pub fn write_vtu(
     write_file(path, signed_indices(text).as_bytes())
 }
 
-/// Indices as the signed numbers that VTK itself writes; they are far from the sign bit. Readers made with numpy turn a mixture
-/// of unsigned and signed ones into floating-point numbers.
+/// Indices as signed integers, as VTK writes them; none reaches the sign bit. Readers based on numpy convert a mixture
+/// of unsigned and signed integers to floating point.
 fn signed_indices(text: String) -> String {
     let names = ["connectivity", "offsets"];
     names.iter().fold(text, |text, name| {

@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::Point3;
 
-use super::error::{Fault, Place, fault};
-use super::{Group, Groups, NamedMesh};
+use super::NamedMesh;
+use super::error::{DAMAGED, Fault, Place, fault};
+use super::groups::{Group, Groups};
 use crate::hex_mesh::{HexMesh, MeshError};
 use crate::index::{HexIdx, NodeIdx};
 use crate::isoparametric;
@@ -16,9 +17,9 @@ pub(super) struct Content {
     /// Positions in the unit of the file.
     pub(super) points: Vec<Point3<f64>>,
     pub(super) cells: Vec<Cell>,
-    /// Names of cells: name, dimension, and which cells.
+    /// Labels of cells: name, dimension, cells.
     pub(super) cell_labels: Vec<(String, u8, Vec<usize>)>,
-    /// Names of points.
+    /// Labels of points.
     pub(super) point_labels: Vec<(String, Vec<usize>)>,
 }
 
@@ -31,7 +32,7 @@ pub(super) struct Cell {
     pub(super) number: u64,
 }
 
-/// Shapes that are of use. Cells of second order and less than three dimensions are taken by their corners.
+/// Supported shapes. Second-order cells of less than three dimensions are read by their corners.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shape {
     Point,
@@ -74,7 +75,7 @@ impl Cell {
     }
 }
 
-/// Where the points and cells of a file went.
+/// Mesh indices of the points and cells of a file.
 struct Places {
     node_of_point: Vec<Option<NodeIdx>>,
     /// Hexahedra only; a hexahedron given twice (once per physical group in MSH 2.2) is one.
@@ -92,7 +93,7 @@ impl Content {
         Ok(NamedMesh { mesh, groups })
     }
 
-    /// The cells that become hexahedra, and where everything goes.
+    /// Hexahedra of the mesh, and mesh indices of all points and cells.
     fn place(&self) -> Result<(Vec<usize>, Places), Fault> {
         let mut seen = HashMap::new();
         let mut hex_of_cell = HashMap::new();
@@ -124,7 +125,7 @@ impl Content {
         fault(Place::File, problem, "save the volume mesh; in Gmsh: mesh in 3D, and put the volume in a physical group")
     }
 
-    /// The nodes of a cell that is known to be a hexahedron.
+    /// Nodes of a hexahedral cell.
     fn nodes_of(&self, cell: usize, places: &Places) -> [NodeIdx; 8] {
         self.cells[cell].corners.map(|point| places.node_of_point[point as usize].unwrap_or_default())
     }
@@ -132,7 +133,7 @@ impl Content {
     fn mesh_fault(&self, error: &MeshError, numbers: &[usize]) -> Fault {
         let advice = match error {
             MeshError::Inverted { .. } => "untangle the mesh, or turn mirrored hexahedra round",
-            MeshError::NonFinite { .. } => super::error::DAMAGED,
+            MeshError::NonFinite { .. } => DAMAGED,
             _ => "mend the mesh: every face belongs to one or two hexahedra",
         };
         let (place, count) = match error {
@@ -148,7 +149,7 @@ impl Content {
         Fault::new(place, format!("{error}{count}"), advice)
     }
 
-    /// How many hexahedra are turned over at a corner.
+    /// Number of hexahedra with an inverted corner.
     fn count_inverted(&self, numbers: &[usize]) -> usize {
         let is_inverted = |&&cell: &&usize| {
             let corners = self.cells[cell].corners.map(|point| self.points[point as usize]);
@@ -194,7 +195,7 @@ fn tidy(mut group: Group) -> Group {
     group
 }
 
-/// Collects cells under names, in the order in which names are met first.
+/// Collects cells by name, names in the order of first use.
 #[derive(Debug, Default)]
 pub(super) struct Labels {
     labels: Vec<(String, u8, Vec<usize>)>,

@@ -7,13 +7,13 @@ pub(super) const CONVERT: &str =
     "convert it: `meshio convert FILE mesh.vtu` (Python), or save it from Gmsh or ParaView as .msh or .vtu";
 pub(super) const DAMAGED: &str = "the file is damaged or incomplete: save it again";
 
-/// Why a mesh file was not read.
+/// Error of reading a mesh file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{}{place}: {problem}; {advice}", path.display())]
 pub struct ImportError {
     /// The file.
     pub path: PathBuf,
-    /// Where in it.
+    /// Place in the file.
     pub place: Place,
     /// Cause, with numbers.
     pub problem: String,
@@ -24,13 +24,13 @@ pub struct ImportError {
 /// A place in a mesh file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// Nowhere in particular.
+    /// The file as a whole.
     File,
     /// A one-based line.
     Line(usize),
     /// An offset in bytes, in the binary part of a file.
     Byte(usize),
-    /// A named array or section, and the line where it begins where that is known.
+    /// A named array or section, with its first line if known.
     Field(String, Option<usize>),
 }
 
@@ -56,7 +56,7 @@ impl ImportError {
     }
 }
 
-/// An [`ImportError`] that does not know its file yet.
+/// An [`ImportError`] without the path of its file.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Fault {
     place: Place,

@@ -5,7 +5,7 @@ use crate::index::{HexIdx, NodeIdx};
 /// Name of a part of the mesh in its file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Group {
-    /// Its name; a physical group of Gmsh without one is called by its number.
+    /// Name; of an unnamed physical group of Gmsh, its number.
     pub name: String,
     /// 3 for volumes, 2 for surfaces, 1 for curves, 0 for points.
     pub dimension: u8,
@@ -17,7 +17,7 @@ pub struct Group {
     pub hexes: Vec<HexIdx>,
 }
 
-/// All groups of a file, in its order.
+/// All groups of a file, in file order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Groups {
     groups: Vec<Group>,
@@ -28,22 +28,22 @@ impl Groups {
         Self { groups }
     }
 
-    /// All of them.
+    /// All groups.
     pub fn iter(&self) -> impl Iterator<Item = &Group> {
         self.groups.iter()
     }
 
-    /// The group of hexahedra of that name.
+    /// Group of hexahedra with that name.
     pub fn volume(&self, name: &str) -> Option<&Group> {
         self.iter().find(|group| group.name == name && group.dimension == 3)
     }
 
-    /// The group of quads of that name.
+    /// Group of quads with that name.
     pub fn surface(&self, name: &str) -> Option<&Group> {
         self.iter().find(|group| group.name == name && group.dimension == 2)
     }
 
-    /// The group of that name of highest dimension below 3, else the volume, as a support or a probe expects.
+    /// Group with that name and the highest dimension below 3, else the volume: the group of a support or a probe.
     pub fn nodes(&self, name: &str) -> Option<&Group> {
         let named = self.iter().filter(|group| group.name == name);
         named.max_by_key(|group| if group.dimension == 3 { -1 } else { i32::from(group.dimension) })

@@ -10,13 +10,13 @@ use std::collections::HashMap;
 use nalgebra::Point3;
 
 use super::assemble::{Cell, Content, Labels, Shape};
-use super::error::{DAMAGED, Fault, fault};
+use super::error::{DAMAGED, Fault, Place, fault};
 use elements::{Element, Kind};
 use reader::Reader;
 
 /// Content of the file read so far.
 #[derive(Default)]
-struct Tale {
+struct MshContent {
     points: Vec<Point3<f64>>,
     point_of_tag: HashMap<u64, u32>,
     cells: Vec<Cell>,
@@ -26,10 +26,10 @@ struct Tale {
     /// MSH 4.1: physical groups of each entity by dimension and number.
     physical_of_entity: HashMap<(i32, i32), Vec<i32>>,
     /// Number of unused elements by type.
-    unfit: Vec<(&'static Element, usize)>,
+    unsupported: Vec<(&'static Element, usize)>,
 }
 
-/// A version that is read.
+/// Supported version.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Version {
     V2,
@@ -39,27 +39,27 @@ enum Version {
 pub(super) fn parse(bytes: &[u8]) -> Result<Content, Fault> {
     let mut reader = Reader::new(bytes);
     let version = read_format(&mut reader)?;
-    let mut tale = Tale::default();
+    let mut content = MshContent::default();
     while let Some(section) = reader.next_section()? {
         match (section, version) {
-            ("PhysicalNames", _) => tale.read_names(&mut reader)?,
+            ("PhysicalNames", _) => content.read_names(&mut reader)?,
             ("PartitionedEntities", _) => {
                 let advice = "save the mesh unpartitioned: Mesh > Unpartition, then export";
                 return fault(reader.place(), "the mesh is partitioned", advice);
             }
-            ("Entities", Version::V4) => v4::read_entities(&mut tale, &mut reader)?,
-            ("Nodes", Version::V4) => v4::read_nodes(&mut tale, &mut reader)?,
-            ("Elements", Version::V4) => v4::read_elements(&mut tale, &mut reader)?,
-            ("Nodes", Version::V2) => v2::read_nodes(&mut tale, &mut reader)?,
-            ("Elements", Version::V2) => v2::read_elements(&mut tale, &mut reader)?,
+            ("Entities", Version::V4) => v4::read_entities(&mut content, &mut reader)?,
+            ("Nodes", Version::V4) => v4::read_nodes(&mut content, &mut reader)?,
+            ("Elements", Version::V4) => v4::read_elements(&mut content, &mut reader)?,
+            ("Nodes", Version::V2) => v2::read_nodes(&mut content, &mut reader)?,
+            ("Elements", Version::V2) => v2::read_elements(&mut content, &mut reader)?,
             _ => reader.skip_section(section)?,
         }
     }
-    tale.refuse_unfit()?;
+    content.refuse_unsupported()?;
     Ok(Content {
-        points: tale.points,
-        cells: tale.cells,
-        cell_labels: tale.labels.into_vec(),
+        points: content.points,
+        cells: content.cells,
+        cell_labels: content.labels.into_vec(),
         point_labels: Vec::new(),
     })
 }
@@ -93,7 +93,7 @@ fn read_format(reader: &mut Reader<'_>) -> Result<Version, Fault> {
     Ok(known)
 }
 
-impl Tale {
+impl MshContent {
     /// `$PhysicalNames`: a count, then `dimension number "name"` on a line each; text in binary files too.
     fn read_names(&mut self, reader: &mut Reader<'_>) -> Result<(), Fault> {
         let n_names = reader.count_line()?;
@@ -118,7 +118,7 @@ impl Tale {
         Ok(())
     }
 
-    /// Takes an element of known kind by its corners, under its physical groups.
+    /// Adds an element by its corners, with its physical groups.
     fn add_element(
         &mut self,
         reader: &Reader<'_>,
@@ -127,8 +127,8 @@ impl Tale {
         tags: &[u64],
         groups: &[i32],
     ) -> Result<(), Fault> {
-        let Kind::Taken(shape) = element.kind else {
-            self.note_unfit(element);
+        let Kind::Supported(shape) = element.kind else {
+            self.count_unsupported(element);
             return Ok(());
         };
         let mut corners = [0; 8];
@@ -154,17 +154,17 @@ impl Tale {
         }
     }
 
-    fn note_unfit(&mut self, element: &'static Element) {
-        match self.unfit.iter_mut().find(|(known, _)| known.code == element.code) {
+    fn count_unsupported(&mut self, element: &'static Element) {
+        match self.unsupported.iter_mut().find(|(known, _)| known.code == element.code) {
             Some((_, count)) => *count += 1,
-            None => self.unfit.push((element, 1)),
+            None => self.unsupported.push((element, 1)),
         }
     }
 
-    /// A mesh with other volumes than 8-node hexahedra would have holes where they are.
-    fn refuse_unfit(&self) -> Result<(), Fault> {
-        let Some((element, count)) = self.unfit.first() else { return Ok(()) };
+    /// Refuses volumes other than 8-node hexahedra: leaving them out would make holes.
+    fn refuse_unsupported(&self) -> Result<(), Fault> {
+        let Some((element, count)) = self.unsupported.first() else { return Ok(()) };
         let problem = format!("holds {count} {}; 8-node hexahedra are read", element.name);
-        fault(super::Place::Field("$Elements".into(), None), problem, element.advice())
+        fault(Place::Field("$Elements".into(), None), problem, element.advice())
     }
 }

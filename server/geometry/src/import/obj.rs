@@ -5,7 +5,8 @@ use std::path::Path;
 
 use nalgebra::Point3;
 
-/// Points of each part \[m\]. Faces decide which part a vertex belongs to; the error is a sentence.
+/// Points of each part \[m\]. A part holds the vertices of its faces.
+///
 /// # Errors
 /// A sentence with path, line and problem.
 pub fn read_obj_parts(path: &Path, metres_per_unit: f64) -> Result<Vec<Vec<Point3<f64>>>, String> {

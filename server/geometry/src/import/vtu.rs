@@ -1,7 +1,7 @@
 //! VTK's unstructured grids in XML (`.vtu`): text, base64 or raw data, inline or appended, plain or compressed.
 //!
-//! Stands beside vtkio, which writes these files in `export`, while vtkio is a release candidate: errors in a user's file
-//! have the place, cause and advice of all mesh imports.
+//! Kept beside vtkio, which writes these files in `export`: vtkio is a release candidate, and errors here carry place,
+//! cause and advice like those of all mesh imports.
 
 mod arrays;
 mod blocks;
@@ -17,9 +17,9 @@ use super::assemble::{Content, Labels};
 use super::error::{DAMAGED, Fault, Place, fault};
 use arrays::{Array, Source};
 
-/// Most values of an array that still name groups.
+/// Largest number of different values of an array that names groups.
 const MAX_VALUES: usize = 256;
-/// Most points or cells.
+/// Largest number of points or cells.
 const MAX_COUNT: u64 = 100_000_000;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Content, Fault> {
@@ -92,7 +92,7 @@ fn read_points(source: &Source<'_>, piece: Node<'_, '_>, n_points: usize) -> Res
     Ok(values.chunks_exact(3).map(|x| Point3::new(x[0], x[1], x[2])).collect())
 }
 
-/// For every array of one component and few values: which entry belongs to which group.
+/// Group of each entry of every array with one component and few different values.
 fn group_names(source: &Source<'_>, piece: Node<'_, '_>, table: &str, n: usize) -> Result<Vec<(usize, String)>, Fault> {
     let tables = piece.children().filter(|node| node.has_tag_name(table));
     let arrays = tables.flat_map(Array::all).filter(|array| array.n_components() == 1 && array.is_numeric());
@@ -108,7 +108,7 @@ fn group_names(source: &Source<'_>, piece: Node<'_, '_>, table: &str, n: usize) 
     Ok(names)
 }
 
-/// The different values as text, if there are few.
+/// Different values as text; `None` if there are too many.
 fn few_values(values: &[f64]) -> Option<BTreeMap<u64, String>> {
     let mut known = BTreeMap::new();
     for value in values {

@@ -1,9 +1,9 @@
-//! From words to an expression, by operator precedence.
+//! Parser of words into an expression, by operator precedence.
 
 use super::words::{Placed, Word, words};
 use super::{Binary, Expression, PredicateError, Unary};
 
-/// Parentheses within parentheses at most.
+/// Largest nesting of parentheses.
 const MAX_DEPTH: usize = 50;
 
 /// An expression, and whether it is a condition or a number.
@@ -36,7 +36,7 @@ fn error(column: usize, problem: impl Into<String>) -> PredicateError {
     PredicateError { column, problem: problem.into() }
 }
 
-/// How tightly an operator binds.
+/// Binding power of an operator.
 fn strength(operator: Binary) -> u8 {
     match operator {
         Binary::Or => 1,

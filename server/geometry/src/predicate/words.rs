@@ -30,7 +30,7 @@ impl Word {
     }
 }
 
-/// Longer ones first.
+/// Longer operators first.
 const OPERATORS: [(&str, Binary); 12] = [
     ("||", Binary::Or),
     ("&&", Binary::And),

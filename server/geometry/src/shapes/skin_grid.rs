@@ -43,8 +43,7 @@ pub fn wedge_skin(wedge: &Wedge, spacing_m: f64) -> Skin {
     Skin::new(positions, triangles).expect("a wedge of positive sizes has a closed skin")
 }
 
-/// Numbers of cells along x and y, and where the vertices of each part lie in the list:
-/// top grid, then wall rows from the top down, then the inside of the bottom.
+/// Numbers of cells along x and y. Vertices are listed as top grid, wall rows from the top down, inside of the bottom.
 struct SkinGrid {
     top: [usize; 2],
     bottom: [usize; 2],
@@ -154,7 +153,7 @@ fn cut([a, b, c, d]: [VertexIdx; 4], parity: usize) -> [[VertexIdx; 3]; 2] {
 }
 
 /// Triangles, facing down, between two parallel lines of vertices; the inner one lies left of the outer one seen
-/// from above. Always takes the shorter of the two next diagonals.
+/// from above. Each step takes the shorter of the two next diagonals.
 fn zip_down(positions: &[Point3<f64>], outer: &[VertexIdx], inner: &[VertexIdx]) -> Vec<[VertexIdx; 3]> {
     let length = |a: VertexIdx, b: VertexIdx| (positions[a.index()] - positions[b.index()]).norm();
     let (mut i, mut j) = (0, 0);

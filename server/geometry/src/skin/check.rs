@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::{Skin, area_vector, triangle_edges};
 use crate::index::{TriangleIdx, VertexIdx};
 
-/// Why vertices and triangles do not make a skin.
+/// Error of a skin's vertices and triangles.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SkinError {
     /// No triangle.
@@ -46,9 +46,9 @@ pub enum SkinError {
          the skin is open, inconsistently turned or not manifold"
     )]
     Edge {
-        /// Where the edge starts.
+        /// Start of the edge.
         from: VertexIdx,
-        /// Where it ends.
+        /// End of the edge.
         to: VertexIdx,
         /// Triangles that run along it.
         n_forward: usize,
@@ -112,7 +112,7 @@ impl Skin {
         self.check_fans()
     }
 
-    /// Walks once around every vertex: the triangles met must be all that it has.
+    /// Walks once around every vertex: the fan must hold all its triangles.
     fn check_fans(&self) -> Result<(), SkinError> {
         let mut next_around = HashMap::with_capacity(3 * self.n_triangles());
         let mut fans = vec![(0, None); self.n_vertices()];

@@ -1,9 +1,10 @@
-//! What the linear solver sees of contact: `h^2 J^T D J - (h^2 J^T D P) App^-1 (h^2 P^T D J)`, tools eliminated.
+//! Contact operator of the linear solver: `h^2 J^T D J - (h^2 J^T D P) App^-1 (h^2 P^T D J)`, tools eliminated.
 
 use nalgebra::Vector6;
 
-use super::proxy::{at_arm, transposed_at_arm};
-use super::{M3, ProxyMotion, Rows, V3};
+use super::proxy::{ProxyMotion, at_arm, transposed_at_arm};
+use super::rows::Rows;
+use super::{M3, V3};
 use crate::lanes::Node;
 
 /// Scratch of the contact operator.
@@ -16,7 +17,7 @@ pub(crate) struct ContactCoupling {
 }
 
 impl ContactCoupling {
-    /// `max_rows` is the most rows of all bodies together.
+    /// `max_rows` bounds the rows of all bodies together.
     pub(crate) fn new(n_bodies: usize, max_rows: usize) -> Self {
         Self { active: Vec::with_capacity(max_rows), on_bodies: vec![Vector6::zeros(); n_bodies] }
     }

@@ -6,14 +6,15 @@
 
 use plica_geometry::CLUSTER_SIZE;
 
-use super::solid::{nearest_on_segment, nearest_segments};
-use super::{Placement, SkinSurface, Solid, V3};
+use super::V3;
+use super::solid::{Placement, Solid, nearest_on_segment, nearest_segments};
+use super::surface::SkinSurface;
 use crate::embedding::SkinPositions;
 
 /// Features closer than this share of an edge to its end are left to the end.
 const INTERIOR: f32 = 0.05;
 
-/// Edges are taken to be this much longer than at rest before their true length is looked at.
+/// Assumed bound on the stretch of edges, before deformed lengths are computed.
 const STRETCH: f32 = 1.5;
 
 /// Normals that point out of the skin by more than this cosine belong to the far side of the tool.
@@ -22,7 +23,7 @@ const FAR_SIDE: f32 = 0.3;
 /// A skin point near a body.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Candidate {
-    /// Same value while the same vertex, edge, or pair of tool point and triangle touches.
+    /// Identifies the vertex, the edge, or the pair of tool point and triangle, from tick to tick.
     pub(crate) feature: u64,
     /// Skin vertices that carry the point, with weights; unused ones have weight 0.
     pub(crate) vertices: [u32; 3],
@@ -35,7 +36,7 @@ pub(crate) struct Candidate {
     pub(crate) gap: f32,
 }
 
-/// Where to look: the skin, a placed body, and how far from it.
+/// Search region: a placed body and its surroundings.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Search<'a> {
     pub(crate) surface: &'a SkinSurface,
@@ -62,7 +63,7 @@ pub(crate) struct Detector {
     /// Signed distance of each vertex of the near clusters; infinite elsewhere.
     distances: Vec<f32>,
     candidates: Vec<Candidate>,
-    /// Candidates that did not fit.
+    /// Candidates beyond the capacity.
     pub(crate) overflow: u32,
 }
 
@@ -290,7 +291,7 @@ impl Detector {
         let w1 = (tool.position - a).cross(&(c - a)).dot(&normal) * inverse;
         let w2 = (b - a).cross(&(tool.position - a)).dot(&normal) * inverse;
         let weights = [1.0 - w1 - w2, w1, w2];
-        // A sharp corner right above an edge is not seen by the edge, whose nearest face may be a side of the tool.
+        // The edge test misses a sharp corner right above the edge: its nearest face may be a side of the tool.
         let interior = if radius > 0.0 { INTERIOR } else { 0.0 };
         if weights.iter().any(|w| *w < interior) {
             return;

@@ -6,8 +6,8 @@
 //! A row sticks while `beta = 1`. Inside the linear solve `f_n` is not cut at zero; a row that pulls is switched off and
 //! the solve goes on without it.
 
-use super::rows::{Row, tangent};
-use super::{M3, Rows, V3};
+use super::rows::{Row, Rows, tangent};
+use super::{M3, V3};
 
 /// A sticking contact begins to slide this far beyond the cone.
 const STICK_MARGIN: f32 = 1.02;
@@ -83,7 +83,8 @@ pub(crate) fn evaluate(rows: &mut Rows, may_activate: bool) -> bool {
     changed || off_cone > CONE_TOLERANCE * cone
 }
 
-/// A new secant of the radial return. Returns how far the force of the last pass is off what the new state asks for \[N\].
+/// A new secant of the radial return. Returns the difference between the last pass's force and the force under the new
+/// state \[N\].
 fn adapt_friction(row: &mut Row, normal_force: f32, may_rise: bool) -> f32 {
     let limit = row.friction * normal_force;
     let trial = row.trial_friction().norm();
@@ -107,8 +108,8 @@ pub(crate) fn predict_secant(row: &mut Row) {
 
 /// Carries the multipliers over to the next tick. `relaxation` in (0, 1]; `bias_decay` is the share of the bias that stays.
 ///
-/// A multiplier is bounded by the row's `max_force`: a tool that is forced where the object cannot go (through a fixed
-/// node, say) would otherwise wind it up without end, and fling the object when it comes free.
+/// A multiplier is bounded by the row's `max_force`: a tool forced through a fixed node, for instance, would otherwise
+/// wind it up without bound and fling the object on release.
 pub(crate) fn settle(row: &mut Row, relaxation: f32, bias_decay: f32) {
     let normal_force = if row.active { row.normal_force() } else { 0.0 };
     let tu = tangent(&row.contact.normal, &row.u);

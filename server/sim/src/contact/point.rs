@@ -3,10 +3,14 @@
 //! For a tool with an axis: where the axis meets the deformed skin, pulled back. For a ball, or where the axis misses:
 //! the centroid of smooth contact weights, 1 at gap <= 0 and falling to 0 at 1 mm. Never a vertex: it jitters.
 
-use super::{Detector, Search, SkinSurface, Solid, V3};
+use super::V3;
+use super::detect::{Detector, Search};
+use super::solid::Solid;
+use super::surface::SkinSurface;
 use crate::embedding::SkinPositions;
+use crate::smoothstep::smoothstep;
 
-/// Gap at which a vertex no longer counts as touching \[m\].
+/// Gap from which a vertex has no weight \[m\].
 const BAND: f32 = 1e-3;
 
 /// A contact point, deformed and on the reference skin \[m\].
@@ -16,7 +20,7 @@ pub(crate) struct ContactPoint {
     pub(crate) reference: V3,
 }
 
-/// `None` if nothing is near. `detector` holds what it found for this body.
+/// Contact point of a body; `None` without skin nearby. `detector` holds the result of its search for this body.
 pub(crate) fn contact_point(search: &Search<'_>, detector: &Detector) -> Option<ContactPoint> {
     let on_axis = if search.solid.has_axis() { on_axis(search, detector) } else { None };
     on_axis.or_else(|| smooth_centroid(search.surface, search.skin, detector))
@@ -73,8 +77,7 @@ fn line_hits(origin: &V3, direction: &V3, [a, b, c]: &[V3; 3]) -> Option<(f32, [
 fn smooth_centroid(surface: &SkinSurface, skin: &SkinPositions, detector: &Detector) -> Option<ContactPoint> {
     let (mut total, mut deformed, mut reference) = (0.0, V3::zeros(), V3::zeros());
     for (vertex, gap) in detector.near_vertices().filter(|&(_, gap)| gap < BAND) {
-        let x = 1.0 - (gap / BAND).clamp(0.0, 1.0);
-        let weight = x * x * (3.0 - 2.0 * x) * surface.vertex_areas[vertex];
+        let weight = smoothstep(1.0 - (gap / BAND).clamp(0.0, 1.0)) * surface.vertex_areas[vertex];
         total += weight;
         deformed += V3::from(skin.vertex(vertex)) * weight;
         reference += surface.rest[vertex] * weight;

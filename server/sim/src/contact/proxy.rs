@@ -7,11 +7,12 @@
 
 use nalgebra::{Isometry3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
-use super::{Rows, V3};
+use super::V3;
+use super::rows::Rows;
 use crate::description::{Coupling, SpringCoupling, ToolDescription};
 use crate::tool::Target;
 
-/// Time constant of the device velocity that the damper sees \[s\].
+/// Time constant of the low-pass filter on the device velocity in the damper \[s\].
 const DEVICE_VELOCITY_FILTER_S: f64 = 5e-3;
 
 /// The simulated tool.
@@ -67,7 +68,7 @@ impl Proxy {
         }
     }
 
-    /// Puts the proxy at rest where the device is.
+    /// Places the proxy at rest at the device pose.
     pub(crate) fn place(&mut self, pose: &Isometry3<f64>) {
         *self = Self { pose: *pose, present: true, ..Self::absent() };
     }
@@ -114,7 +115,7 @@ impl Proxy {
         }
     }
 
-    /// Takes the step. A prescribed tool ends where its device is.
+    /// Takes the step. A prescribed tool ends at the device pose.
     pub(crate) fn finish(&mut self, tool: &ToolDescription, target: &Target, motion: &ProxyMotion, h: f64) {
         self.twist = motion.twist + motion.delta;
         match (&tool.coupling, &motion.spring) {
@@ -133,7 +134,7 @@ impl Proxy {
 }
 
 impl ProxyMotion {
-    /// A tool (or plane) that moves as it is told.
+    /// A tool or plane with prescribed motion.
     pub(crate) fn prescribed(lever: f32, twist: Vector6<f64>) -> Self {
         Self {
             lever,

@@ -1,10 +1,12 @@
-//! Constraint rows: which candidates become rows, and what they inherit from the contacts of the last tick.
+//! Constraint rows: selected from the candidates, with the state of the last tick's contacts.
 
-use super::{Candidate, SkinSurface, V3};
+use super::V3;
+use super::detect::Candidate;
+use super::surface::SkinSurface;
 use crate::embedding::SkinEmbedding;
 use crate::lanes::Node;
 
-/// A contact as it is remembered from tick to tick.
+/// A contact, kept from tick to tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Contact {
     /// Tool index, or `n_tools + plane index`.
@@ -17,7 +19,7 @@ pub(crate) struct Contact {
     pub(crate) slip: V3,
     /// Secant of the friction cone, `min(1, mu f_n / |t|)`: 1 sticks, less slides, 0 is to be predicted.
     pub(crate) secant: f32,
-    /// Penetration that was there when it began, fading out \[m\]; never positive.
+    /// Penetration found when the contact began, fading out \[m\]; never positive.
     pub(crate) bias: f32,
     pub(crate) point: V3,
     pub(crate) normal: V3,
@@ -82,7 +84,7 @@ struct Ranked {
     old: Option<u32>,
 }
 
-/// What is asked of the candidates of one body.
+/// Parameters for selecting the rows of one body.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Selection<'a> {
     pub(crate) body: u32,
@@ -90,12 +92,12 @@ pub(crate) struct Selection<'a> {
     pub(crate) origin: V3,
     pub(crate) activation_gap: f32,
     pub(crate) max_contacts: usize,
-    /// Distance that rows keep when there are too many \[m\].
+    /// Least distance of rows when there are too many \[m\].
     pub(crate) spacing: f32,
     pub(crate) dt: f32,
-    /// Deepest penetration that one step sets out to resolve \[m\].
+    /// Largest penetration that one step resolves \[m\].
     pub(crate) max_correction: f32,
-    /// A multiplier may grow to what presses the skin point this deep \[m\].
+    /// Indentation whose static force bounds the multiplier \[m\].
     pub(crate) max_press: f32,
     pub(crate) surface: &'a SkinSurface,
     /// Contacts of the last tick, all bodies.
@@ -106,7 +108,7 @@ pub(crate) struct Selection<'a> {
 const HAND_OVER: f32 = 10e-3;
 
 impl Rows {
-    /// `n` is the most rows of all bodies together.
+    /// `n` bounds the rows of all bodies together.
     pub(crate) fn new(n: usize, longest_row: usize) -> Self {
         Self {
             rows: Vec::with_capacity(n),
@@ -123,7 +125,7 @@ impl Rows {
         self.weights.clear();
     }
 
-    /// Turns the candidates of one body into rows. Returns how many had to be left out.
+    /// Turns the candidates of one body into rows. Returns the number left out.
     ///
     /// `tool_velocity(arm)` is the free velocity of the body's point at `arm`.
     pub(crate) fn select(
@@ -146,7 +148,7 @@ impl Rows {
         dropped
     }
 
-    /// Candidates that could touch in this step, with the old contact they continue.
+    /// Candidates that may come into contact in this step, each with the old contact that it continues.
     fn rank(
         &mut self,
         embedding: &SkinEmbedding,
@@ -170,8 +172,11 @@ impl Rows {
         }
     }
 
-    /// All of them if they fit. Else the deepest ones that no row holds yet (a quarter of the room), loaded ones at a
-    /// distance from each other that makes them fit, and the heaviest and deepest of the rest.
+    /// All candidates if they fit, else in this order:
+    ///
+    /// 1. new penetrations, deepest first, up to a quarter of the room;
+    /// 2. loaded contacts, at the least spacing that makes them fit;
+    /// 3. the most loaded, then the deepest, of the rest.
     fn choose(&mut self, candidates: &[Candidate], selection: &Selection<'_>) -> u32 {
         self.chosen.clear();
         let room = selection.max_contacts;
@@ -253,8 +258,8 @@ impl Rows {
         self.rows[row].skin_velocity = self.jacobian_product(row, v);
     }
 
-    /// Loaded contacts that found no row give their load to the nearest row of their body. A row that is new takes their
-    /// whole state, so that a contact that walks from one feature of the skin to the next goes on as it was.
+    /// Hands the load of contacts without a row to the nearest row of their body. A new row takes their whole state, so
+    /// that a contact that moves from one feature of the skin to the next continues unchanged.
     fn hand_over(&mut self, first_row: usize, selection: &Selection<'_>) {
         let rows = &mut self.rows[first_row..];
         let is_continued = |rows: &[Row], o: &Contact| rows.iter().any(|r| r.contact.feature == o.feature);
@@ -293,7 +298,7 @@ impl Rows {
         V3::new(sum[0], sum[1], sum[2])
     }
 
-    /// How many active rows load the place of this one, itself included: `sum (1 - d^2 / cell^2)^2`.
+    /// Number of active rows that load the surroundings of this one, itself included: `sum (1 - d^2 / cell^2)^2`.
     pub(crate) fn crowding(&self, row: usize, cell: f32) -> f32 {
         let point = self.rows[row].contact.point;
         let overlap = |other: &Row| {

@@ -24,7 +24,7 @@ pub(crate) struct Polytope {
     pub(crate) center: V3,
 }
 
-/// Where a shape is: `world <- shape`.
+/// Pose of a shape, `world <- shape`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Placement {
     pub(crate) rotation: M3,
@@ -58,7 +58,7 @@ impl Solid {
         }
     }
 
-    /// Whether a contact point is looked for along the tool's axis (z) rather than around the touching skin.
+    /// Whether the contact point lies on the tool's axis (z) rather than at the centroid of the skin in contact.
     pub(crate) fn has_axis(&self) -> bool {
         match self {
             Self::Round { a, b, .. } => a != b,

@@ -1,4 +1,4 @@
-//! Topology of the skin as contact detection needs it: edges and triangles by cluster, rest geometry, effective masses.
+//! Topology of the skin for contact detection: edges and triangles by cluster, rest geometry, effective masses.
 
 use plica_geometry::{CLUSTER_SIZE, Skin};
 
@@ -27,7 +27,7 @@ pub(crate) struct SkinSurface {
     pub(crate) edge_lengths: Vec<f32>,
     /// `tr(J A_0^-1 J^T) / 3` of each vertex \[1/kg\].
     pub(crate) inverse_mass: Vec<f32>,
-    /// Force per displacement of each vertex, held still \[N/m\].
+    /// Static stiffness of each vertex \[N/m\].
     pub(crate) static_stiffness: Vec<f32>,
 }
 

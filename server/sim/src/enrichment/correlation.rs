@@ -1,4 +1,4 @@
-//! Which way of comparing states is used.
+//! Correlation of the present state with the examples, by any of the correlators.
 
 use nalgebra::DMatrix;
 use plica_geometry::ReferenceSkin;
@@ -28,7 +28,7 @@ pub(crate) enum Correlation {
 }
 
 impl Correlation {
-    /// `products` are those of what is to be predicted, `[n][n]`.
+    /// `products` are inner products of the fields to predict, `[n][n]`.
     pub(crate) fn new(
         model: &Model,
         skin: &ReferenceSkin,
@@ -42,8 +42,8 @@ impl Correlation {
             Correlator::Rescale => Self::None,
             Correlator::Ssh12(options) => Self::Ssh12(Ssh12::new(situations, options)),
             Correlator::Linear(kind) => {
-                let mesh = (&model.description().mesh, &model.order);
-                Self::Linear(Linear::new(kind, situations, products, mesh).ok_or_else(singular)?)
+                let mesh = &model.description().mesh;
+                Self::Linear(Linear::new(kind, situations, products, mesh, &model.order).ok_or_else(singular)?)
             }
             Correlator::Rbf { width_cells } => {
                 Self::Rbf(Rbf::new(situations, products, width_cells * cell).ok_or_else(singular)?)

@@ -1,25 +1,25 @@
-//! One way to enrich: how the present state is compared with the examples, and how their detail is laid on the skin.
+//! One enrichment method with its tables: layout, correlation and interpolation.
 
-use super::charts::{ChartOptions, Charts};
 use super::correlation::Correlation;
 use super::error::EnricherError;
-use super::examples::{Examples, SeenExamples, check, without_duplicates};
+use super::examples::{Examples, PreparedExamples, check, without_duplicates};
 use super::fade::Trust;
-use super::field::{Field, FieldScratch};
+use super::field::{Field, FieldScratch, TrainingSet};
 use super::kriging::KrigingChoice;
+use super::layout::{ChartOptions, Charts};
 use super::options::{Correlator, EnrichmentOptions};
 use super::rescale::Rescale;
 use super::situation::{Contact, Offsets, Touch, coordinates};
-use super::surface::{Place, Surface};
+use super::surface::{FramedPoint, Surface};
 use crate::contact::V3;
 use crate::lanes::{F, LANES, Node};
 use crate::model::Model;
 use crate::state::State;
 
-/// Normals farther apart than this lie on sides of the object that have nothing to do with each other \[rad\].
+/// Largest angle between normals in one chart; beyond it vertices belong to another side of the object \[rad\].
 const MAX_NORMAL_ANGLE: f64 = 2.2;
 
-/// Tables of one way to enrich one model; never changes.
+/// Constant tables of one enrichment method for one model.
 #[derive(Debug, Clone)]
 pub struct Enricher {
     options: EnrichmentOptions,
@@ -29,11 +29,11 @@ pub struct Enricher {
     field: Field,
     n_examples: usize,
     n_nodes: usize,
-    /// Of charts \[m\].
+    /// Radius of charts \[m\].
     radius: f32,
 }
 
-/// Scratch of an evaluation; means nothing between calls.
+/// Scratch of an evaluation; undefined between calls.
 #[derive(Debug, Clone)]
 pub struct EnricherScratch {
     layout: Vec<[F; 2]>,
@@ -60,32 +60,32 @@ impl Enricher {
             coordinates: options.coordinates,
         };
         let charts = Charts::new(&surface, chart);
-        let seen = SeenExamples::new(model, &surface, &charts, examples);
-        let situations = seen.situations();
+        let prepared = PreparedExamples::new(model, &surface, &charts, examples);
+        let situations = prepared.situations();
         let needs_examples = options.correlator != Correlator::Rescale;
         let rescale = if options.field.control_variate || !needs_examples {
             Rescale::fit(&situations, &examples.details, surface.reference().vertex_areas(), radius_m)
         } else {
             Rescale::none(radius_m)
         };
-        let taught = if needs_examples {
-            (&situations[..], &examples.details[..])
-        } else {
-            (&situations[..0], &examples.details[..0])
-        };
-        let field = Field::new(options.field, radius_m, &rescale, surface.reference(), taught);
-        let correlation = Correlation::new(model, surface.reference(), options.correlator, taught.0, field.products())?;
-        let (n_examples, n_nodes) = (taught.0.len(), model.n_nodes());
+        let n_examples = if needs_examples { situations.len() } else { 0 };
+        let training_set =
+            TrainingSet { situations: &situations[..n_examples], details: &examples.details[..n_examples] };
+        let field = Field::new(options.field, radius_m, &rescale, surface.reference(), training_set);
+        let correlator = options.correlator;
+        let correlation =
+            Correlation::new(model, surface.reference(), correlator, training_set.situations, field.products())?;
+        let n_nodes = model.n_nodes();
         drop(situations);
         Ok(Self { options, surface, charts, correlation, field, n_examples, n_nodes, radius: radius_m as f32 })
     }
 
-    /// What it was made with.
+    /// Options of the method.
     pub fn options(&self) -> &EnrichmentOptions {
         &self.options
     }
 
-    /// The hyper-parameters that leave-one-out chose, for kriging.
+    /// Hyper-parameters chosen by leave-one-out, for kriging.
     pub fn kriging_choice(&self) -> Option<KrigingChoice> {
         self.correlation.kriging_choice()
     }
@@ -95,7 +95,7 @@ impl Enricher {
         f64::from(self.radius)
     }
 
-    /// Bytes of tables: those of the charts, and those of the examples.
+    /// Bytes of the tables of charts and of examples.
     pub fn bytes(&self) -> [usize; 2] {
         [self.charts.bytes(), self.field.bytes()]
     }
@@ -116,7 +116,7 @@ impl Enricher {
         self.evaluate_within([0.0, 1.0], contact, scratch, detail).confidence
     }
 
-    /// The same with bounds for the share that is laid on the skin.
+    /// [`Enricher::evaluate`] with bounds on the share of the detail.
     pub(crate) fn evaluate_within(
         &self,
         bounds: [f32; 2],
@@ -124,21 +124,21 @@ impl Enricher {
         scratch: &mut EnricherScratch,
         detail: &mut [Node],
     ) -> Trust {
-        let Some((place, trust)) = self.weigh(bounds, contact, scratch) else {
+        let Some((framed, trust)) = self.weigh(bounds, contact, scratch) else {
             detail.fill([0.0; 4]);
             return Trust::NONE;
         };
         let EnricherScratch { layout, weights, field, .. } = scratch;
-        self.field.evaluate(&contact.at(&place, layout), weights, trust.share, field, detail);
+        self.field.evaluate(&contact.at(&framed, layout), weights, trust.share, field, detail);
         trust
     }
 
-    /// Whether [`Enricher::sample_within`] does all that [`Enricher::evaluate`] does.
+    /// Whether [`Enricher::sample_within`] yields the whole detail of [`Enricher::evaluate`].
     pub(crate) fn is_sampled(&self) -> bool {
         self.field.is_sampled()
     }
 
-    /// Hands out detail sixteen vertices at a time instead of filling an array: half the memory that an evaluation moves.
+    /// Calls `each` with the detail of sixteen vertices at a time instead of filling an array: half the memory traffic.
     pub(crate) fn sample_within(
         &self,
         bounds: [f32; 2],
@@ -146,13 +146,13 @@ impl Enricher {
         scratch: &mut EnricherScratch,
         each: impl FnMut(usize, &[Node; LANES]),
     ) -> Option<Trust> {
-        let (place, trust) = self.weigh(bounds, contact, scratch)?;
+        let (framed, trust) = self.weigh(bounds, contact, scratch)?;
         let EnricherScratch { layout, weights, field, .. } = scratch;
-        self.field.sample(&contact.at(&place, layout), weights, trust.share, field, each);
+        self.field.sample(&contact.at(&framed, layout), weights, trust.share, field, each);
         Some(trust)
     }
 
-    /// A contact in a running simulation, whose offsets are deformed less rest positions.
+    /// A contact in a running simulation; offsets are deformed less rest positions.
     pub(crate) fn contact<'a>(&'a self, model: &Model, state: &'a State, touch: &'a Touch) -> Contact<'a> {
         let offsets = Offsets::Between(&state.skin, self.surface.rest());
         Contact { displacements: &state.u[..model.n_free], offsets, touch }
@@ -164,16 +164,16 @@ impl Enricher {
         [least, most]: [f32; 2],
         contact: &Contact<'_>,
         scratch: &mut EnricherScratch,
-    ) -> Option<(Place, Trust)> {
+    ) -> Option<(FramedPoint, Trust)> {
         let EnricherScratch { layout, weights, kernel, .. } = scratch;
-        let place = self.lay_out(contact.touch, layout)?;
-        let mut trust = self.correlation.weigh(&contact.at(&place, layout), kernel, weights);
+        let framed = self.lay_out(contact.touch, layout)?;
+        let mut trust = self.correlation.weigh(&contact.at(&framed, layout), kernel, weights);
         trust.share = if self.options.fade { trust.share.clamp(least, most) } else { 1.0 };
         trust.confidence = trust.confidence.min(trust.share);
-        Some((place, trust))
+        Some((framed, trust))
     }
 
-    /// Detail with given weights `[n]` in place of the correlator's: interpolation alone.
+    /// Detail with given weights `[n]` in framed of the correlator's: interpolation alone.
     pub fn interpolate(
         &self,
         contact: &Contact<'_>,
@@ -183,17 +183,17 @@ impl Enricher {
     ) {
         let EnricherScratch { layout, field, .. } = scratch;
         detail.fill([0.0; 4]);
-        if let Some(place) = self.lay_out(contact.touch, layout) {
-            self.field.evaluate(&contact.at(&place, layout), weights, 1.0, field, detail);
+        if let Some(framed) = self.lay_out(contact.touch, layout) {
+            self.field.evaluate(&contact.at(&framed, layout), weights, 1.0, field, detail);
         }
     }
 
     /// Lays the skin out around a contact point; `None` where no chart reaches.
-    fn lay_out(&self, touch: &Touch, layout: &mut [[F; 2]]) -> Option<Place> {
-        let place = self.surface.place(&touch.contact_point);
-        let chart = self.charts.at(&place)?;
+    fn lay_out(&self, touch: &Touch, layout: &mut [[F; 2]]) -> Option<FramedPoint> {
+        let framed = self.surface.framed_point(&touch.contact_point);
+        let chart = self.charts.at(&framed)?;
         self.charts.lay_out(&chart, &self.surface, layout);
-        Some(place)
+        Some(framed)
     }
 
     /// The skin vertex nearest to a contact point.
@@ -201,20 +201,20 @@ impl Enricher {
         self.surface.nearest(&touch.contact_point)
     }
 
-    /// How far a vertex is from where it rests \[m\].
+    /// Distance of a vertex from its rest position \[m\].
     pub(crate) fn offset(&self, state: &State, vertex: usize) -> f32 {
         let rest = self.surface.reference().skin().positions()[vertex].coords.cast::<f32>();
         (V3::from(state.skin.vertex(vertex)) - rest).norm()
     }
 
-    /// How much a vertex belongs to the contact that was last evaluated: 1 there, 0 where its chart ends.
+    /// Closeness of a vertex to the contact evaluated last: 1 at the contact point, 0 from the rim of its chart on.
     #[inline(always)]
     pub(crate) fn closeness(&self, scratch: &EnricherScratch, vertex: usize) -> f32 {
         let [x, y] = coordinates(&scratch.layout, vertex);
         (1.0 - (x * x + y * y) / (self.radius * self.radius)).max(0.0).powi(2)
     }
 
-    /// Whether it was made for such a model.
+    /// Whether the numbers of nodes and vertices are those of a model.
     pub fn fits(&self, model: &Model) -> bool {
         self.n_nodes == model.n_nodes() && self.surface.n_vertices() == model.n_skin()
     }

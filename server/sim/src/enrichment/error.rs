@@ -1,6 +1,6 @@
-//! Why a method cannot be prepared.
+//! Error of preparing an enrichment method.
 
-/// Why there is no enricher.
+/// Error of preparing an enricher.
 #[derive(Debug, thiserror::Error)]
 pub enum EnricherError {
     /// An array of the examples has another length than the model or the other arrays.
@@ -8,11 +8,11 @@ pub enum EnricherError {
     Length {
         /// The example.
         example: usize,
-        /// Which array.
+        /// The array.
         what: &'static str,
         /// Its length.
         found: usize,
-        /// The length it should have.
+        /// Length needed.
         expected: usize,
     },
     /// Fewer examples than the method needs.

@@ -1,45 +1,45 @@
-//! Examples as training leaves them, and as the run time would see them.
+//! Examples from training, and prepared as at run time.
 
 use nalgebra::Vector3;
 
-use super::charts::{Charts, FAR};
 use super::error::EnricherError;
+use super::layout::{Charts, FAR};
 use super::situation::{Contact, Offsets, Situation, Touch};
-use super::surface::{Place, Surface};
+use super::surface::{FramedPoint, Surface};
 use crate::lanes::{F, Node};
 use crate::model::Model;
 use crate::state::State;
 
-/// Examples whose displacements differ by less than this share are one.
+/// Examples whose displacements differ by less than this share are duplicates.
 const DUPLICATE: f64 = 5e-3;
 
-/// Examples of coarse and accurate skins, as training leaves them.
+/// Examples of coarse and accurate skins, from training.
 #[derive(Debug, Clone, Default)]
 pub struct Examples {
     /// Coarse displacements in the order of the mesh's nodes, `[n][n_nodes]` \[m\].
     pub displacements: Vec<Vec<[f32; 3]>>,
     /// `s_a - s_c`, `[n][n_skin]` \[m\].
     pub details: Vec<Vec<[f32; 3]>>,
-    /// Where the tool touched, `[n]`.
+    /// Contact point and tool of each example, `[n]`.
     pub touches: Vec<Touch>,
 }
 
-/// The examples as the run time would see them.
-pub(crate) struct SeenExamples {
+/// Examples with offsets, layouts and frames as at run time.
+pub(crate) struct PreparedExamples {
     displacements: Vec<Vec<Node>>,
     offsets: Vec<Vec<Node>>,
     layouts: Vec<Vec<[F; 2]>>,
-    places: Vec<Place>,
+    framed_points: Vec<FramedPoint>,
     touches: Vec<Touch>,
 }
 
-impl SeenExamples {
+impl PreparedExamples {
     pub(crate) fn new(model: &Model, surface: &Surface, charts: &Charts, examples: &Examples) -> Self {
-        let mut seen = Self {
+        let mut prepared = Self {
             displacements: Vec::new(),
             offsets: Vec::new(),
             layouts: Vec::new(),
-            places: Vec::new(),
+            framed_points: Vec::new(),
             touches: examples.touches.clone(),
         };
         let mut state = State::new(model);
@@ -48,30 +48,30 @@ impl SeenExamples {
             state.set_node_displacements(model, &nodes);
             let mut offsets = vec![[0.0; 4]; model.n_skin()];
             state.write_padded_offsets(model, &mut offsets);
-            let place = surface.place(&touch.contact_point);
+            let framed = surface.framed_point(&touch.contact_point);
             let mut layout = vec![[F::splat(FAR); 2]; surface.groups().n()];
-            if let Some(chart) = charts.at(&place) {
+            if let Some(chart) = charts.at(&framed) {
                 charts.lay_out(&chart, surface, &mut layout);
             }
-            seen.displacements.push(state.u[..model.n_free].to_vec());
-            seen.offsets.push(offsets);
-            seen.layouts.push(layout);
-            seen.places.push(place);
+            prepared.displacements.push(state.u[..model.n_free].to_vec());
+            prepared.offsets.push(offsets);
+            prepared.layouts.push(layout);
+            prepared.framed_points.push(framed);
         }
-        seen
+        prepared
     }
 
     pub(crate) fn situations(&self) -> Vec<Situation<'_>> {
         let of_example = |i: usize| {
             let (displacements, touch) = (&self.displacements[i][..], &self.touches[i]);
             let contact = Contact { displacements, offsets: Offsets::Padded(&self.offsets[i]), touch };
-            contact.at(&self.places[i], &self.layouts[i])
+            contact.at(&self.framed_points[i], &self.layouts[i])
         };
-        (0..self.places.len()).map(of_example).collect()
+        (0..self.framed_points.len()).map(of_example).collect()
     }
 }
 
-/// Whether all arrays fit.
+/// Checks the lengths of all arrays.
 pub(crate) fn check(model: &Model, examples: &Examples) -> Result<(), EnricherError> {
     let found = examples.touches.len();
     if found < 2 {
@@ -94,7 +94,7 @@ pub(crate) fn check(model: &Model, examples: &Examples) -> Result<(), EnricherEr
     }
 }
 
-/// Of examples that are nearly the same, the first.
+/// Examples without near duplicates: the first of each is kept.
 pub(crate) fn without_duplicates(examples: &Examples) -> Examples {
     let squared = |a: &[[f32; 3]], b: &[[f32; 3]]| -> f64 {
         a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| f64::from(a - b).powi(2)).sum()

@@ -1,18 +1,20 @@
-//! From how new a state is to how much its detail is trusted.
+//! Fade of detail with the novelty of a state.
+
+use crate::smoothstep::smoothstep;
 
 /// Trust of a correlator in its weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Trust {
-    /// How much of the detail is laid on the skin: between 0 and 1.
+    /// Share of the detail that is added to the skin, 0 to 1.
     pub(crate) share: f32,
-    /// What is published: between 0, the plain coarse skin, and 1, a state as in the examples.
+    /// Published confidence: 0 for the plain coarse skin, 1 for a state among the examples.
     pub(crate) confidence: f32,
 }
 
 impl Trust {
     /// Full trust.
     pub(crate) const FULL: Self = Self { share: 1.0, confidence: 1.0 };
-    /// Nothing to lay on the skin.
+    /// No detail.
     pub(crate) const NONE: Self = Self { share: 0.0, confidence: 0.0 };
 }
 
@@ -31,17 +33,11 @@ impl Fade {
         Self { begin: begin as f32, end: (0.5 * (begin + 1.0)) as f32 }
     }
 
-    /// The share fades; the confidence tells trusted states apart as well.
+    /// The share fades between `begin` and `end`; the confidence falls with novelty from 0 on.
     pub(crate) fn trust(&self, novelty: f32) -> Trust {
         let share = 1.0 - smoothstep((novelty - self.begin) / (self.end - self.begin));
         Trust { share, confidence: share * (1.0 - novelty).clamp(0.0, 1.0) }
     }
-}
-
-/// From 0 at `x = 0` to 1 at `x = 1`, level at both ends.
-pub(crate) fn smoothstep(x: f32) -> f32 {
-    let x = x.clamp(0.0, 1.0);
-    x * x * (3.0 - 2.0 * x)
 }
 
 /// `W`: 1 up to the first share of the radius, 0 from the second on.

@@ -1,16 +1,17 @@
-//! Interpolation: the detail that weights make of the examples \[SSH12, 5.3\].
+//! Interpolation of detail from weighted examples \[SSH12, 5.3\].
 //!
 //! A vertex at `q` in the chart of the contact point gets
 //!
 //! `d(p) = sum_i w_i D_i - B(|q|) u_c(p)`, `D_i = d_i + B u_c,i`
 //!
-//! and methods differ in where they look up `D_i`, what is left of an example's detail once the coarse dent is rescaled:
+//! with the remainder `D_i` of an example's detail after rescaling of the coarse indentation. Interpolators differ in
+//! the point at which they look up `D_i`:
 //!
 //! * vector: at the vertex itself, `D_i(p)`;
-//! * stamp: at the same place relative to the contact, `W S_i(q)`, on a grid of texels in the frame at the contact point, blended
+//! * stamp: at the same chart coordinates, `W S_i(q)`, on a grid of texels in the frame at the contact point, blended
 //!   first and sampled once, with the window `W` that is 1 inside and 0 beyond the chart;
-//! * blend: the stamp, and at the vertex what the stamp misses of its own example, `D_i(p) - W S_i(q_i(p))`;
-//! * warp: at a place between the two, see [`super::warp`].
+//! * blend: the stamp, and at the vertex the residual of the stamp on its own example, `D_i(p) - W S_i(q_i(p))`;
+//! * warp: at a point between the two, see [`super::warp`].
 
 use nalgebra::{DMatrix, Matrix3, Vector2, Vector3};
 use plica_geometry::ReferenceSkin;
@@ -25,7 +26,7 @@ use super::situation::{Situation, vector};
 use super::warp::Warp;
 use crate::lanes::{F, LANES, Node};
 
-/// What blended examples are laid on.
+/// Support of the blended examples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Interpolator {
     /// Vertices, Eq. 12.
@@ -34,11 +35,11 @@ pub enum Interpolator {
     Stamp,
     /// The chart near the contact point, vertices beyond.
     Blend,
-    /// The chart near the contact point, each example's own place beyond.
+    /// From the chart near the contact point to the vertex beyond, continuously.
     Warp,
 }
 
-/// How stamps are stored.
+/// Interpolation of detail and storage of stamps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FieldOptions {
     /// See [`Interpolator`].
@@ -47,15 +48,23 @@ pub struct FieldOptions {
     pub texels: usize,
     /// Shares of the chart's radius between which the window falls from 1 to 0.
     pub window: [f64; 2],
-    /// Modes that are kept; at least as many as examples keeps the examples.
+    /// Number of modes; at least the number of examples keeps them exactly.
     pub modes: usize,
-    /// How they are stored.
+    /// Storage of modes.
     pub precision: Precision,
-    /// Whether examples only tell what rescaling the coarse dent leaves.
+    /// Whether examples hold the remainder after rescaling of the coarse indentation.
     pub control_variate: bool,
 }
 
-/// Examples' detail, ready to be blended.
+/// Examples that a method is trained on.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TrainingSet<'a> {
+    pub(crate) situations: &'a [Situation<'a>],
+    /// `[n][n_skin]` \[m\]
+    pub(crate) details: &'a [Vec<[f32; 3]>],
+}
+
+/// Detail of the examples, ready to be blended.
 #[derive(Debug, Clone)]
 pub(crate) struct Field {
     options: FieldOptions,
@@ -63,7 +72,7 @@ pub(crate) struct Field {
     lattice: Lattice,
     texel_groups: Groups,
     /// `W (B - B_far)` at texels.
-    shade: Vec<f32>,
+    rescaling: Vec<f32>,
     far: f32,
     products: DMatrix<f64>,
     stamps: Option<Modes>,
@@ -80,19 +89,20 @@ pub(crate) struct FieldScratch {
 }
 
 impl Field {
-    /// `details` are the examples', `[n][n_skin]` \[m\]; without examples only rescaling is left.
+    /// Tables of the examples' detail; an empty training set leaves rescaling alone.
     pub(crate) fn new(
         options: FieldOptions,
         radius: f64,
         rescale: &Rescale,
         skin: &ReferenceSkin,
-        (situations, details): (&[Situation<'_>], &[Vec<[f32; 3]>]),
+        training_set: TrainingSet<'_>,
     ) -> Self {
+        let TrainingSet { situations, details } = training_set;
         let mut this = Self::without_examples(options, radius, rescale);
         if situations.is_empty() {
             return this;
         }
-        let left: Vec<_> = situations.iter().zip(details).map(|(s, d)| this.left_over(s, d)).collect();
+        let left: Vec<_> = situations.iter().zip(details).map(|(s, d)| this.remainder(s, d)).collect();
         let at_vertices = |fields: &[Vec<Vector3<f64>>]| -> Vec<Vec<f64>> {
             fields.iter().map(|d| planar(Groups::new(d.len()), d)).collect()
         };
@@ -115,15 +125,16 @@ impl Field {
         let (compressed, products) = compress(&at_texels);
         (this.stamps, this.products) = (Some(compressed), products);
         if options.interpolator == Interpolator::Blend {
-            let missed = situations.iter().zip(&stamps).zip(&left).map(|((s, stamp), d)| this.missed(s, stamp, d));
-            this.vectors = Some(compress(&at_vertices(&missed.collect::<Vec<_>>())).0);
+            let stamp_residual =
+                situations.iter().zip(&stamps).zip(&left).map(|((s, stamp), d)| this.stamp_residual(s, stamp, d));
+            this.vectors = Some(compress(&at_vertices(&stamp_residual.collect::<Vec<_>>())).0);
         }
         this
     }
 
     fn without_examples(options: FieldOptions, radius: f64, rescale: &Rescale) -> Self {
         let lattice = Lattice::new(radius, options.texels);
-        let shade = |texel| {
+        let rescaling = |texel| {
             let r = lattice.position(texel).norm();
             let inside = f64::from(window(options.window, (r / radius) as f32));
             (inside * (rescale.at(r) - rescale.far())) as f32
@@ -133,7 +144,7 @@ impl Field {
             radius: radius as f32,
             lattice,
             texel_groups: Groups::new(lattice.n_texels()),
-            shade: (0..lattice.n_texels()).map(shade).collect(),
+            rescaling: (0..lattice.n_texels()).map(rescaling).collect(),
             far: rescale.far() as f32,
             products: DMatrix::zeros(0, 0),
             stamps: None,
@@ -143,18 +154,23 @@ impl Field {
     }
 
     /// `D_i = d_i + B u_c,i`, with the same `B` as at run time.
-    fn left_over(&self, situation: &Situation<'_>, detail: &[[f32; 3]]) -> Vec<Vector3<f64>> {
-        let shade = self.paired(&self.shade.iter().map(|s| f32x4::splat(*s)).collect::<Vec<_>>());
+    fn remainder(&self, situation: &Situation<'_>, detail: &[[f32; 3]]) -> Vec<Vector3<f64>> {
+        let rescaling = self.paired(&self.rescaling.iter().map(|s| f32x4::splat(*s)).collect::<Vec<_>>());
         let of_vertex = |(v, d): (usize, &[f32; 3])| {
             let place = self.lattice.locate_one(situation.coordinates(v));
-            let b = f64::from(self.far + self.lattice.sample(&shade, place).to_array()[0]);
+            let b = f64::from(self.far + self.lattice.sample(&rescaling, place).to_array()[0]);
             Vector3::from(d.map(f64::from)) + situation.offset(v).cast::<f64>() * b
         };
         detail.iter().enumerate().map(of_vertex).collect()
     }
 
     /// `D_i(p) - W S_i(q_i(p))`, `stamp` being `W S_i`.
-    fn missed(&self, situation: &Situation<'_>, stamp: &[Vector3<f64>], left: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    fn stamp_residual(
+        &self,
+        situation: &Situation<'_>,
+        stamp: &[Vector3<f64>],
+        left: &[Vector3<f64>],
+    ) -> Vec<Vector3<f64>> {
         let world = situation.frame.transpose().cast::<f64>();
         let texel = |d: &Vector3<f64>| {
             let d = world * d;
@@ -193,7 +209,7 @@ impl Field {
         pairs
     }
 
-    /// Products of the examples' fields, `[n][n]`: what correlators learn to predict.
+    /// Inner products of the examples' fields, `[n][n]`: correlators are fitted to predict these fields.
     pub(crate) fn products(&self) -> &DMatrix<f64> {
         &self.products
     }
@@ -208,7 +224,7 @@ impl Field {
         }
     }
 
-    /// Detail of all skin vertices, `[n_skin]` \[m\], all of it times `share`.
+    /// Detail of all skin vertices times `share`, `[n_skin]` \[m\].
     pub(crate) fn evaluate(
         &self,
         situation: &Situation<'_>,
@@ -232,12 +248,12 @@ impl Field {
         }
     }
 
-    /// Whether [`Field::sample`] is all of the detail.
+    /// Whether [`Field::sample`] yields the whole detail.
     pub(crate) fn is_sampled(&self) -> bool {
         self.warp.is_none() && self.vectors.is_none()
     }
 
-    /// Hands out stamps and rescaling, sixteen vertices at a time \[m\].
+    /// Calls `each` with stamps and rescaling, sixteen vertices at a time \[m\].
     #[inline(always)]
     pub(crate) fn sample(
         &self,
@@ -247,14 +263,14 @@ impl Field {
         scratch: &mut FieldScratch,
         mut each: impl FnMut(usize, &[Node; LANES]),
     ) {
-        let FieldScratch { coefficients, planar, texels } = scratch;
-        self.blend_stamps(situation, weights, (coefficients, planar), texels);
+        self.blend_stamps(situation, weights, scratch);
+        let texels = &scratch.texels;
         let (far, share) = (f32x4::splat(self.far), f32x4::splat(share));
         for (group, q) in situation.layout.iter().enumerate() {
-            let (texel, x, y) = self.lattice.locate(q);
+            let located = self.lattice.locate(q);
             let offsets = situation.offsets.group(group);
             let detail = std::array::from_fn(|lane| {
-                let sampled = self.lattice.sample(texels, (texel[lane], x[lane], y[lane]));
+                let sampled = self.lattice.sample(texels, located.lane(lane));
                 let rescaled = far + f32x4::splat(sampled.to_array()[3]);
                 (share * (sampled - rescaled * f32x4::from(offsets[lane]))).to_array()
             });
@@ -262,30 +278,25 @@ impl Field {
         }
     }
 
-    /// Blended, turned to the world, with the shade of the rescaling as fourth component.
-    fn blend_stamps(
-        &self,
-        situation: &Situation<'_>,
-        weights: &[f32],
-        (coefficients, planar): (&mut [f32], &mut [F]),
-        texels: &mut [Pair],
-    ) {
+    /// Blends the stamps and turns them to world axes; the fourth component is `W (B - B_far)`.
+    fn blend_stamps(&self, situation: &Situation<'_>, weights: &[f32], scratch: &mut FieldScratch) {
+        let FieldScratch { coefficients, planar, texels } = scratch;
         let n = self.texel_groups.n();
         let Some(stamps) = &self.stamps else {
-            let shade = self.shade.iter().enumerate();
-            shade.for_each(|(texel, shade)| put(texels, texel, f32x4::new([0.0, 0.0, 0.0, *shade])));
+            let rescaling = self.rescaling.iter().enumerate();
+            rescaling.for_each(|(texel, rescaling)| put(texels, texel, f32x4::new([0.0, 0.0, 0.0, *rescaling])));
             return;
         };
         stamps.blend(weights, coefficients, planar);
         let m = situation.frame.map(F::splat);
-        for (g, shade) in self.shade.chunks(LANES).enumerate() {
+        for (g, rescaling) in self.rescaling.chunks(LANES).enumerate() {
             let local = [planar[g], planar[n + g], planar[2 * n + g]];
             let world: [[f32; LANES]; 3] = std::array::from_fn(|k| {
                 let sum = local[0] * m[(0, k)];
                 local[2].mul_add(m[(2, k)], local[1].mul_add(m[(1, k)], sum)).to_array()
             });
-            for (lane, shade) in shade.iter().enumerate() {
-                put(texels, g * LANES + lane, f32x4::new([world[0][lane], world[1][lane], world[2][lane], *shade]));
+            for (lane, rescaling) in rescaling.iter().enumerate() {
+                put(texels, g * LANES + lane, f32x4::new([world[0][lane], world[1][lane], world[2][lane], *rescaling]));
             }
         }
     }
@@ -308,7 +319,7 @@ impl Field {
     }
 }
 
-/// Axis after axis, each filled up to whole groups.
+/// Components axis by axis, each padded to whole groups.
 fn planar(groups: Groups, field: &[Vector3<f64>]) -> Vec<f64> {
     let value = |k: usize, i: usize| field.get(i).map_or(0.0, |v| v[k]);
     (0..3).flat_map(|k| (0..groups.n() * LANES).map(move |i| (k, i))).map(|(k, i)| value(k, i)).collect()

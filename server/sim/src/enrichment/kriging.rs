@@ -3,8 +3,8 @@
 //! `w = (K + lambda I)^-1 k`, `k(a, b) = f_a.f_b / v exp(-|f_a - f_b|^2 / (2 L^2 v)) exp(-|c_a - c_b|^2 / (2 l^2)) max(0, n_a.n_b)`
 //!
 //! `v` is the mean of `|f|^2`. The factor `f_a.f_b` makes the detail vanish with the deformation and grow with it. `L`, `l` and
-//! `lambda` are those with the smallest leave-one-out error on the examples. The share of the variance that examples leave
-//! unexplained, `1 - k.w / k(a, a)`, says how new a state is.
+//! `lambda` are those with the smallest leave-one-out error on the examples. The novelty of a state is the share of the
+//! variance that examples leave unexplained, `1 - k.w / k(a, a)`.
 
 use nalgebra::{DMatrix, Vector3};
 
@@ -17,7 +17,7 @@ const FEATURE_SCALES: [f64; 3] = [1.0, 2.0, 4.0];
 const CONTACT_CELLS: [f64; 3] = [1.0, 2.0, 4.0];
 const NUGGETS: [f64; 3] = [1e-3, 1e-2, 1e-1];
 
-/// A contact as the kernel sees it.
+/// Kernel arguments of a contact.
 #[derive(Debug, Clone, Copy)]
 struct Point {
     features: [f32; N_FEATURES],
@@ -44,7 +44,7 @@ pub(crate) struct Kriging {
     fade: Fade,
 }
 
-/// What leave-one-out chose.
+/// Hyper-parameters chosen by leave-one-out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KrigingChoice {
     /// `L`
@@ -58,7 +58,7 @@ pub struct KrigingChoice {
 }
 
 impl Kriging {
-    /// `gram` holds the products of what is to be predicted, `[n][n]`.
+    /// `gram` holds inner products of the fields to predict, `[n][n]`.
     pub(crate) fn new(
         stencil: Stencil,
         situations: &[Situation<'_>],
@@ -158,13 +158,13 @@ impl Point {
     }
 }
 
-/// Sum of the squares of `r_i = [K^-1 d]_i / [K^-1]_ii`, what each example misses of itself if the others tell it \[RW06, 5.12\].
+/// Sum of the squares of `r_i = [K^-1 d]_i / [K^-1]_ii`, the leave-one-out residual of each example \[RW06, 5.12\].
 pub(crate) fn leave_one_out(inverse: &DMatrix<f64>, gram: &DMatrix<f64>) -> f64 {
     let solved = inverse * gram * inverse;
     (0..gram.nrows()).map(|i| solved[(i, i)] / inverse[(i, i)].powi(2)).sum()
 }
 
-/// In eight partial sums, so that it runs on vector lanes.
+/// Dot product in eight partial sums, for vector lanes.
 #[inline(always)]
 fn dot(a: &[f32], b: &[f32]) -> f32 {
     let mut sums = [0.0_f32; 8];

@@ -21,10 +21,10 @@ pub(crate) struct Lattice {
     n: usize,
 }
 
-/// A texel beside the next one of its row, as [`Lattice::sample`] reads them.
+/// A texel and the next one of its row, the layout for [`Lattice::sample`].
 pub(crate) type Pair = [f32x4; 2];
 
-/// Puts a texel where samples read it.
+/// Stores a texel in both pairs that hold it.
 #[inline(always)]
 pub(crate) fn put(pairs: &mut [Pair], texel: usize, value: f32x4) {
     pairs[texel][0] = value;
@@ -39,6 +39,30 @@ pub(crate) struct Covered {
     pub(crate) texel: usize,
     pub(crate) corners: [usize; 3],
     pub(crate) weights: [f64; 3],
+}
+
+/// Position of a point in the grid.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct GridPoint {
+    /// Lower texel of the cell around the point; negative outside the grid.
+    pub(crate) texel: i32,
+    /// Shares of the upper texels along both coordinates.
+    pub(crate) x: f32,
+    pub(crate) y: f32,
+}
+
+/// Sixteen [`GridPoint`]s.
+pub(crate) struct GridPoints {
+    texel: [i32; LANES],
+    x: [f32; LANES],
+    y: [f32; LANES],
+}
+
+impl GridPoints {
+    #[inline(always)]
+    pub(crate) fn lane(&self, lane: usize) -> GridPoint {
+        GridPoint { texel: self.texel[lane], x: self.x[lane], y: self.y[lane] }
+    }
 }
 
 impl Lattice {
@@ -59,16 +83,16 @@ impl Lattice {
         Vector2::new(coordinate(texel / self.n), coordinate(texel % self.n))
     }
 
-    /// Where a coordinate lies between texels.
+    /// Fractional texel index of a coordinate.
     fn index(&self, x: f64) -> f64 {
         let t = x / self.radius;
         let s = (1.0 + STRETCH) * t / (1.0 + STRETCH * t.abs());
         0.5 * (s + 1.0) * (self.n - 1) as f64
     }
 
-    /// The lower texel and the shares of the upper ones, for sixteen points; what lies outside has a negative texel.
+    /// Positions of sixteen points in the grid.
     #[inline(always)]
-    pub(crate) fn locate(&self, q: &[F; 2]) -> ([i32; LANES], [f32; LANES], [f32; LANES]) {
+    pub(crate) fn locate(&self, q: &[F; 2]) -> GridPoints {
         let (last, radius) = ((self.n - 1) as f32, F::splat(self.radius as f32));
         let stretch = F::splat(STRETCH as f32);
         let place = |x: F| {
@@ -81,18 +105,17 @@ impl Lattice {
         let cell = |x: F| x.fast_max(F::ZERO).fast_min(F::splat(last - 1.0)).floor();
         let (i, j) = (cell(x), cell(y));
         let texel = inside.bitselect(i.mul_add(F::splat(self.n as f32), j), F::splat(-1.0));
-        (texel.fast_trunc_int().to_array(), (x - i).to_array(), (y - j).to_array())
+        GridPoints { texel: texel.fast_trunc_int().to_array(), x: (x - i).to_array(), y: (y - j).to_array() }
     }
 
-    /// The same for one point.
-    pub(crate) fn locate_one(&self, q: [f32; 2]) -> (i32, f32, f32) {
-        let (texel, x, y) = self.locate(&q.map(F::splat));
-        (texel[0], x[0], y[0])
+    /// Position of one point in the grid.
+    pub(crate) fn locate_one(&self, q: [f32; 2]) -> GridPoint {
+        self.locate(&q.map(F::splat)).lane(0)
     }
 
     /// Bilinear between the four texels of a cell; zero outside.
     #[inline(always)]
-    pub(crate) fn sample(&self, pairs: &[Pair], (texel, x, y): (i32, f32, f32)) -> f32x4 {
+    pub(crate) fn sample(&self, pairs: &[Pair], GridPoint { texel, x, y }: GridPoint) -> f32x4 {
         if texel < 0 {
             return f32x4::ZERO;
         }
@@ -101,7 +124,7 @@ impl Lattice {
         (second - first).mul_add(f32x4::splat(y), first)
     }
 
-    /// Texels that triangles cover, once a skin is laid out; `None` is what is not reached.
+    /// Texels covered by triangles at chart coordinates `at`; `None` for vertices that the chart does not reach.
     pub(crate) fn cover(&self, skin: &Skin, at: &[Option<Vector2<f64>>]) -> Vec<Covered> {
         let mut covered = Vec::new();
         for triangle in skin.triangles() {
@@ -158,12 +181,12 @@ mod tests {
         let lattice = Lattice::new(0.08, 32);
         for texel in [0, 5, 33, 500, 32 * 31 - 2] {
             let q = lattice.position(texel);
-            let (found, x, y) = lattice.locate_one([q.x as f32, q.y as f32]);
+            let GridPoint { texel: found, x, y } = lattice.locate_one([q.x as f32, q.y as f32]);
             let (row, column) = (found as f32 / 32.0, found as f32 % 32.0);
             assert!((row.floor() + x - (texel / 32) as f32).abs() < 1e-3, "{texel}: {found} {x}");
             assert!((column + y - (texel % 32) as f32).abs() < 1e-3, "{texel}: {found} {y}");
         }
-        assert!(lattice.locate_one([0.081, 0.0]).0 < 0 && lattice.locate_one([0.0, -1e6]).0 < 0);
+        assert!(lattice.locate_one([0.081, 0.0]).texel < 0 && lattice.locate_one([0.0, -1e6]).texel < 0);
         let [middle, rim] = [16, 31].map(|i| lattice.position(32 * i).x - lattice.position(32 * (i - 1)).x);
         assert!(rim > 4.0 * middle, "{middle} {rim}");
     }
@@ -174,9 +197,10 @@ mod tests {
         let mut pairs = vec![[f32x4::ZERO; 2]; 64];
         let value = |texel: usize| (texel / 8) as f32 * 10.0 + (texel % 8) as f32;
         (0..64).for_each(|texel| put(&mut pairs, texel, f32x4::splat(value(texel))));
-        assert_eq!(lattice.sample(&pairs, (19, 0.0, 0.0)).to_array(), [value(19); 4]);
-        assert_eq!(lattice.sample(&pairs, (19, 0.5, 0.25)).to_array(), [value(19) + 5.25; 4]);
-        assert_eq!(lattice.sample(&pairs, (-1, 0.5, 0.25)).to_array(), [0.0; 4]);
+        let sample = |texel, x, y| lattice.sample(&pairs, GridPoint { texel, x, y }).to_array();
+        assert_eq!(sample(19, 0.0, 0.0), [value(19); 4]);
+        assert_eq!(sample(19, 0.5, 0.25), [value(19) + 5.25; 4]);
+        assert_eq!(sample(-1, 0.5, 0.25), [0.0; 4]);
     }
 
     #[test]

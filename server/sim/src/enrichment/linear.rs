@@ -14,12 +14,12 @@ use super::ssh12::product;
 use crate::lanes::Node;
 use crate::solver::NodeOrder;
 
-/// Least `lambda`, in units of the mean of the diagonal: what rounding leaves of a pseudo-inverse.
+/// Least `lambda`, in units of the mean of the diagonal: the pseudo-inverse up to rounding.
 const PSEUDO_INVERSE: f64 = 1e-10;
 /// Candidates of ridge and harmonic regularisation, by leave-one-out error.
 const CANDIDATES: [f64; 5] = [1e-4, 1e-3, 1e-2, 1e-1, 1.0];
 
-/// Which linear method.
+/// Linear method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LinearKind {
     /// Pseudo-inverse.
@@ -38,12 +38,13 @@ pub(crate) struct Linear {
 }
 
 impl Linear {
-    /// `products` are those of what is to be predicted, `[n][n]`.
+    /// `products` are inner products of the fields to predict, `[n][n]`.
     pub(crate) fn new(
         kind: LinearKind,
         situations: &[Situation<'_>],
         products: &DMatrix<f64>,
-        (mesh, order): (&HexMesh, &NodeOrder),
+        mesh: &HexMesh,
+        order: &NodeOrder,
     ) -> Option<Self> {
         let n_free = situations[0].displacements.len();
         let column = |k: usize, s: &Situation<'_>| f64::from(s.displacements[k / 3][k % 3]);
@@ -73,7 +74,7 @@ impl Linear {
         Some(Self { rows })
     }
 
-    /// Writes `w`; knows no doubt.
+    /// Writes `w`, with full trust.
     pub(crate) fn weigh(&self, situation: &Situation<'_>, weights: &mut [f32]) -> Trust {
         let u = situation.displacements;
         for (w, row) in weights.iter_mut().zip(self.rows.chunks_exact(u.len())) {
@@ -83,7 +84,7 @@ impl Linear {
     }
 }
 
-/// `L^-1 U`; edges join the corners of hexahedra, fixed nodes hold.
+/// `L^-1 U`; edges join the corners of hexahedra, fixed nodes are Dirichlet conditions.
 fn harmonic(mesh: &HexMesh, order: &NodeOrder, u: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n_free = u.nrows() / 3;
     let mut laplacian = DMatrix::zeros(n_free, n_free);
@@ -98,7 +99,7 @@ fn harmonic(mesh: &HexMesh, order: &NodeOrder, u: &DMatrix<f64>) -> Option<DMatr
             }
         }
     }
-    // An object that nothing holds has a singular Laplacian.
+    // The Laplacian of an object without supports is singular.
     let factor = (laplacian + DMatrix::identity(n_free, n_free) * 1e-6).cholesky()?;
     let mut solved = u.clone();
     for axis in 0..3 {

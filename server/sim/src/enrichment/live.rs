@@ -1,8 +1,8 @@
 //! Enrichment over time: each tool carries its own window of detail.
 //!
-//! While a tool touches, its window follows the contact point. After release the window is held, and its detail goes with the
-//! deformation, until the skin under it has recovered. If a tool touches elsewhere before that, the old window hands over to the
-//! new one within [`HAND_OVER_S`]. Overlapping windows share the skin by a partition of unity.
+//! During contact, a tool's window follows the contact point. After release the window is held, and its detail scales
+//! with the deformation, until the skin under it has recovered. On a new contact elsewhere before that, the old window
+//! hands over to the new one within [`HAND_OVER_S`]. Overlapping windows share the skin by a partition of unity.
 
 use std::sync::Arc;
 
@@ -12,55 +12,54 @@ use super::clearance::keep_clear;
 use super::enricher::{Enricher, EnricherScratch};
 use super::fade::Trust;
 use super::situation::{Contact, Touch, vector};
-use crate::contact::V3;
 use crate::lanes::{LANES, Node};
 use crate::model::Model;
 use crate::state::State;
 use crate::step::placement;
 
-/// Time in which one window of a tool takes over from another, and detail may come or go as trust does \[s\].
+/// Time of a hand-over between windows of a tool, and least time of a full change of a window's share \[s\].
 const HAND_OVER_S: f32 = 0.05;
-/// A contact point that moves farther than this in a tick is another contact, in coarse cells.
+/// Motion in one tick beyond which a contact point is a new contact, in coarse cells.
 const JUMP_CELLS: f64 = 0.25;
-/// A held window ends when the skin under it has gone back to this share of its offset at release ...
+/// A held window ends once the skin under it is below this share of its offset at release ...
 const RECOVERED: f32 = 0.02;
-/// ... or moves more slowly than this, as it may rest elsewhere \[m/s\] ...
+/// ... or slower than this, as it may rest deformed \[m/s\] ...
 const STILL_M_PER_S: f32 = 1e-4;
-/// ... and has done so for so long: it swings \[s\].
+/// ... for this long, as it swings \[s\].
 const RECOVERED_S: f32 = 0.1;
-/// Least share of a window where its chart does not reach, so that somebody owns every vertex.
+/// Least closeness of a window, so that the partition of unity covers vertices outside all charts.
 const LEAST_CLOSENESS: f32 = 1e-3;
 
-/// One tool's detail.
+/// Window of detail of one contact.
 #[derive(Debug, Clone, Copy)]
 struct Window {
     touch: Touch,
-    /// Between 0 and 1: how far it has taken over.
+    /// Progress of the hand-over, 0 to 1.
     gain: f32,
-    /// How far it was trusted when it was last laid on the skin, and the tick.
+    /// Trust at the last evaluation, and its tick.
     laid: Option<(Trust, u64)>,
     released: Option<Released>,
 }
 
-/// What a held window waits for.
+/// Recovery of the skin under a held window.
 #[derive(Debug, Clone, Copy)]
 struct Released {
     vertex: usize,
-    /// Offset of the vertex at release, and a tick ago \[m\].
+    /// Offset of the vertex at release, and in the previous tick \[m\].
     at_release: f32,
     before: f32,
-    /// How long it has been back \[s\].
+    /// Time since recovery \[s\].
     recovered_s: f32,
 }
 
-/// A tool's window, and the one it takes over from.
+/// A tool's window, and its predecessor during a hand-over.
 #[derive(Debug, Clone, Copy, Default)]
 struct ToolWindows {
     current: Option<Window>,
     leaving: Option<Window>,
 }
 
-/// What enrichment remembers between ticks, with its tables and scratch. Nothing allocates once it is made.
+/// Enrichment of a running simulation: windows, tables and scratch. Allocates on construction only.
 #[derive(Debug, Clone)]
 pub struct LiveEnrichment {
     enricher: Arc<Enricher>,
@@ -74,7 +73,7 @@ pub struct LiveEnrichment {
 }
 
 impl LiveEnrichment {
-    /// Nothing touched yet.
+    /// Enrichment before the first contact.
     pub fn new(model: &Model, enricher: Arc<Enricher>) -> Self {
         let n_skin = model.n_skin();
         Self {
@@ -88,12 +87,12 @@ impl LiveEnrichment {
         }
     }
 
-    /// The tables.
+    /// Tables of the method.
     pub fn enricher(&self) -> &Arc<Enricher> {
         &self.enricher
     }
 
-    /// Takes over the windows of another enrichment of the same model: its examples change while tools touch.
+    /// Copies the windows of another enrichment of the same model, for a change of examples during contact.
     pub fn adopt(&mut self, other: &Self) {
         self.tools.copy_from_slice(&other.tools);
     }
@@ -114,7 +113,7 @@ impl LiveEnrichment {
         with_window.reduce(f32::min).unwrap_or(0.0)
     }
 
-    /// Follows the contacts of a tick. To be called after every tick; takes next to no time.
+    /// Follows the contacts of a tick. To be called after every tick; cheap.
     pub fn follow(&mut self, model: &Model, state: &State) {
         let step = model.timestep_s() as f32 / HAND_OVER_S;
         let jump = JUMP_CELLS * f64::from(model.cell_size);
@@ -153,12 +152,11 @@ impl LiveEnrichment {
             self.write_all(model, state, out)
         };
         for (reading, solid) in state.tools().iter().zip(&model.solids).filter(|(r, _)| r.present && reach > 0.0) {
-            let coarse = |v: usize| V3::from(state.skin.vertex(v));
-            keep_clear(solid, &placement(&reading.proxy), (state.skin.boxes(), reach), coarse, out);
+            keep_clear(solid, &placement(&reading.proxy), &state.skin, reach, out);
         }
     }
 
-    /// The skin with a single window's detail, in one pass; the largest detail \[m\].
+    /// Writes the skin with a single window's detail, in one pass; returns the largest detail \[m\].
     fn write_one(&mut self, model: &Model, state: &State, out: &mut [[f32; 3]]) -> f32 {
         let Some(window) = self.tools.iter_mut().flat_map(ToolWindows::windows_mut).next() else { return 0.0 };
         let bounds = window.share_bounds(state.tick(), model.timestep_s() as f32 / HAND_OVER_S);
@@ -181,7 +179,7 @@ impl LiveEnrichment {
         vector(&largest.to_array()).norm()
     }
 
-    /// The skin with the detail of all windows; the largest detail \[m\].
+    /// Writes the skin with the detail of all windows; returns the largest detail \[m\].
     fn write_all(&mut self, model: &Model, state: &State, out: &mut [[f32; 3]]) -> f32 {
         state.write_padded_offsets(model, &mut self.offsets);
         self.lay_all(model, state);
@@ -227,7 +225,8 @@ impl Window {
         Self { touch, gain, laid: None, released: None }
     }
 
-    /// The share on the skin may move by `step` a tick, so that detail does not pop; at first it is what it is, as there is no detail yet.
+    /// Bounds on the share: it changes by at most `step` per tick, so that detail does not pop; unbounded at the first
+    /// evaluation.
     fn share_bounds(&self, tick: u64, step: f32) -> [f32; 2] {
         self.laid.map_or([0.0, 1.0], |(trust, before)| {
             let most = step * tick.saturating_sub(before) as f32;
@@ -249,13 +248,13 @@ impl ToolWindows {
         self.current.and_then(|w| w.laid).map_or(0.0, |(trust, _)| trust.confidence)
     }
 
-    /// `is_alone` if no tool has a window: then there is nobody to take over from.
+    /// Moves the window or begins a new one. `is_alone`: no tool has a window, so that a new one needs no hand-over.
     fn touch(&mut self, touch: Touch, jump: f64, is_alone: bool) {
         let is_elsewhere = |w: &Window| (w.touch.contact_point - touch.contact_point).norm() > jump;
         match &mut self.current {
             Some(current) if !is_elsewhere(current) => (current.touch, current.released) = (touch, None),
             Some(current) => {
-                // Of two that should leave, the one that shows more does.
+                // Of two predecessors, the one with the larger gain stays.
                 if self.leaving.is_none_or(|l| l.gain <= current.gain) {
                     self.leaving = Some(*current);
                 }

@@ -1,9 +1,10 @@
-//! Named methods: the one table that scenes, `plicad evaluate` and `plicad chart` read, so that a name served is the name measured.
+//! Named methods: the one table that scenes, `plicad evaluate` and `plicad chart` read, so that a served method is the
+//! one measured under its name.
 
 use nalgebra::Vector3;
 
-use super::charts::Coordinates;
 use super::field::{FieldOptions, Interpolator};
+use super::layout::Coordinates;
 use super::linear::LinearKind;
 use super::modes::Precision;
 use super::options::{Correlator, EnrichmentOptions};
@@ -12,8 +13,8 @@ use super::ssh12::Ssh12Options;
 /// Name of the default method.
 pub const DEFAULT_METHOD: &str = "kriging-stamp";
 
-/// Chart radius of a blend without control variate, in coarse cells: the default chart covers most of the object, which would make
-/// the blend a stamp.
+/// Chart radius of a blend without control variate, in coarse cells: the default chart covers most of the object and
+/// would make the blend a stamp.
 const BLEND_CELLS: f64 = 2.0;
 /// Width of radial basis functions, in coarse cells.
 const RBF_CELLS: f64 = 1.33;
@@ -207,7 +208,7 @@ fn paper(interpolator: Interpolator) -> EnrichmentOptions {
     combined(Correlator::Ssh12(paper_options()), interpolator)
 }
 
-/// As in the paper: no null example.
+/// As in the paper, without a null example.
 fn paper_options() -> Ssh12Options {
     Ssh12Options { null_weight: 0.0, ..Ssh12Options::default() }
 }

@@ -1,4 +1,5 @@
-//! Fields of all examples, compressed: `field_i = sum_m a_im mode_m`, so that blending costs no more for more examples.
+//! Fields of all examples, compressed: `field_i = sum_m a_im mode_m`, so that the cost of blending does not grow with
+//! the examples.
 //!
 //! Modes are the principal components of the fields (not centred: no example, no detail), the strongest first.
 
@@ -7,7 +8,7 @@ use wide::{i16x16, i32x16};
 
 use crate::lanes::{F, LANES};
 
-/// How numbers are stored.
+/// Storage of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Precision {
     /// 32-bit floats.
@@ -35,7 +36,8 @@ pub(crate) struct Modes {
 }
 
 impl Modes {
-    /// Of the fields `[n_examples][length]` with their products; as many modes as examples or more keep the fields as they are.
+    /// Modes of the fields `[n_examples][length]` with inner products `gram`; with at least as many modes as examples,
+    /// the fields themselves.
     pub(crate) fn new(fields: &[Vec<f64>], gram: &DMatrix<f64>, n_modes: usize, precision: Precision) -> Self {
         let n = fields.len();
         if n_modes >= n {

@@ -1,19 +1,19 @@
-//! What a way to enrich is made of.
+//! Options of an enrichment method.
 
 use nalgebra::Vector3;
 
-use super::charts::Coordinates;
 use super::field::{FieldOptions, Interpolator};
+use super::layout::Coordinates;
 use super::linear::LinearKind;
 use super::modes::Precision;
 use super::ssh12::Ssh12Options;
 
-/// How the present state is compared with examples.
+/// Correlation of the present state with examples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Correlator {
-    /// Not at all: the coarse dent is rescaled, nothing else.
+    /// None: the coarse indentation is rescaled.
     Rescale,
-    /// The paper's.
+    /// Similarity of displacement vectors, the paper's.
     Ssh12(Ssh12Options),
     /// A linear map.
     Linear(LinearKind),
@@ -26,12 +26,12 @@ pub enum Correlator {
     Kriging,
 }
 
-/// A way to enrich. Lengths come from the coarse mesh: its cells are what detail is missing below.
+/// Options of an enrichment method. Lengths are in cells of the coarse mesh, below which detail is missing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnrichmentOptions {
-    /// How states are compared.
+    /// Correlation.
     pub correlator: Correlator,
-    /// How detail is laid on the skin.
+    /// Interpolation.
     pub field: FieldOptions,
     /// Radius of the chart around a contact point, in coarse cells.
     pub radius_cells: f64,
@@ -39,9 +39,9 @@ pub struct EnrichmentOptions {
     pub anchor_cells: f64,
     /// Geodesic or projected.
     pub coordinates: Coordinates,
-    /// Whether what is not trusted fades to the coarse skin.
+    /// Whether untrusted detail fades to the coarse skin.
     pub fade: bool,
-    /// Axes that stamps are laid out along.
+    /// Axes of stamps.
     pub axes: [Vector3<f64>; 2],
 }
 

@@ -1,5 +1,5 @@
 //! Correlation by the position of the tool with radial basis functions, as in PhyNNeSS \[DDSA11\]: `w = K^-1 k`,
-//! `k_i = exp(-|p - p_i|^2 / (2 l^2))`. Nothing of the state enters but where the tool is.
+//! `k_i = exp(-|p - p_i|^2 / (2 l^2))`. The position of the tool is the only input.
 
 use nalgebra::{DMatrix, Vector3};
 
@@ -7,7 +7,7 @@ use super::fade::Trust;
 use super::kriging::leave_one_out;
 use super::situation::Situation;
 
-/// Candidates for what is added to the diagonal, by leave-one-out error.
+/// Candidates for the term added to the diagonal, chosen by leave-one-out error.
 const NUGGETS: [f64; 4] = [1e-4, 1e-3, 1e-2, 1e-1];
 
 /// Weights by the position of the tool.
@@ -20,7 +20,7 @@ pub(crate) struct Rbf {
 }
 
 impl Rbf {
-    /// With the width `l` \[m\]; `products` are those of what is to be predicted, `[n][n]`.
+    /// `width` is `l` \[m\]; `products` are inner products of the fields to predict, `[n][n]`.
     pub(crate) fn new(situations: &[Situation<'_>], products: &DMatrix<f64>, width: f64) -> Option<Self> {
         let positions: Vec<_> = situations.iter().map(|s| s.tool_origin).collect();
         let n = positions.len();
@@ -33,7 +33,7 @@ impl Rbf {
         Some(Self { positions, width: width as f32, inverse })
     }
 
-    /// Writes `w`, without a doubt; `scratch` holds at least `n` numbers.
+    /// Writes `w`, with full trust; `scratch` holds at least `n` numbers.
     pub(crate) fn weigh(&self, situation: &Situation<'_>, scratch: &mut [f32], weights: &mut [f32]) -> Trust {
         let n = self.positions.len();
         let k = &mut scratch[..n];

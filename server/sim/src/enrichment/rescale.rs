@@ -1,8 +1,8 @@
-//! What of the coarse dent is taken back, by the distance from the contact point: `d = -B(r) u_c`.
+//! Rescaling of the coarse indentation by the distance from the contact point: `d = -B(r) u_c`.
 //!
-//! A coarse mesh smears a dent; most of that can be undone without any example at hand. `B` falls linearly between knots, is the
-//! least-squares fit of the training examples' detail, and is one number wherever the chart does not reach. Alone it is a
-//! baseline; beneath examples it is a control variate: they only have to tell what it leaves.
+//! A coarse mesh smears an indentation; rescaling undoes most of that before any example is blended. `B` is piecewise linear
+//! between knots, constant beyond the chart, and the least-squares fit of the training examples' detail. Alone it is a
+//! baseline; with examples it is a control variate, and they hold the remainder.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,7 +10,7 @@ use super::situation::Situation;
 
 /// Knots as shares of the radius.
 const KNOTS: [f64; 16] = [0.0, 0.025, 0.05, 0.075, 0.1, 0.125, 0.15, 0.18, 0.21, 0.25, 0.31, 0.38, 0.5, 0.65, 0.8, 1.0];
-/// Pulls coefficients that no skin vertex tells about to zero.
+/// Ridge that pulls coefficients without skin vertices to zero.
 const RIDGE: f64 = 1e-6;
 
 /// `B`
@@ -22,7 +22,7 @@ pub(crate) struct Rescale {
 }
 
 impl Rescale {
-    /// Fits it to examples with details `[n][n_skin]` \[m\]; vertices count by their area.
+    /// Fits `B` to examples with details `[n][n_skin]` \[m\]; vertices are weighted by area.
     pub(crate) fn fit(situations: &[Situation<'_>], details: &[Vec<[f32; 3]>], areas: &[f64], radius: f64) -> Self {
         const N: usize = KNOTS.len() + 1;
         let mut matrix = DMatrix::<f64>::zeros(N, N);
@@ -49,13 +49,13 @@ impl Rescale {
         Self { radius, at_knots: [0.0; KNOTS.len()], far: 0.0 }
     }
 
-    /// `B` at a distance \[m\]; beyond the radius what holds there.
+    /// `B` at a distance \[m\].
     pub(crate) fn at(&self, distance: f64) -> f64 {
         let value = |i: usize| self.at_knots.get(i).copied().unwrap_or(self.far);
         shares(distance, self.radius).iter().map(|(i, share)| share * value(*i)).sum()
     }
 
-    /// `B` where the chart does not reach.
+    /// `B` beyond the chart.
     pub(crate) fn far(&self) -> f64 {
         self.far
     }
@@ -67,7 +67,7 @@ pub(crate) fn distance(situation: &Situation<'_>, vertex: usize) -> f64 {
     x.hypot(y)
 }
 
-/// Coefficients that a distance depends on, with their shares.
+/// Coefficients around a distance, with their interpolation weights.
 fn shares(distance: f64, radius: f64) -> [(usize, f64); 2] {
     let x = distance / radius;
     if x >= 1.0 {

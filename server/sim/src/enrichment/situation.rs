@@ -1,15 +1,15 @@
-//! What an enricher sees of one contact: the coarse state, and the skin laid out around the contact point.
+//! Input of an enricher: the coarse state, and the skin laid out around the contact point.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::groups::Planar;
-use super::surface::Place;
+use super::surface::FramedPoint;
 use crate::embedding::SkinPositions;
 use crate::lanes::{F, LANES, Node};
 use crate::model::Model;
 use crate::state::State;
 
-/// Where a tool touches.
+/// Contact point and tool of a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touch {
     /// Contact point on the reference skin \[m\].
@@ -21,9 +21,9 @@ pub struct Touch {
 /// Offsets of the coarse skin from rest, `[n_skin]` \[m\].
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Offsets<'a> {
-    /// As they are.
+    /// Stored, padded to four components.
     Padded(&'a [Node]),
-    /// Deformed less rest positions: what a running simulation has at hand.
+    /// Deformed less rest positions, in a running simulation.
     Between(&'a SkinPositions, &'a Planar),
 }
 
@@ -40,7 +40,7 @@ impl Offsets<'_> {
         }
     }
 
-    /// Of sixteen vertices; what lies beyond the last one means nothing.
+    /// Offsets of sixteen vertices; values beyond the last vertex are undefined.
     #[inline(always)]
     pub(crate) fn group(&self, group: usize) -> [Node; LANES] {
         match self {
@@ -57,7 +57,7 @@ impl Offsets<'_> {
     }
 }
 
-/// One contact as an enricher is asked about it: the coarse state, and where a tool touches.
+/// One contact: the coarse state, the contact point and the tool.
 #[derive(Debug, Clone, Copy)]
 pub struct Contact<'a> {
     /// Displacements of free nodes, in internal order \[m\].
@@ -72,23 +72,23 @@ impl<'a> Contact<'a> {
         Self { displacements: &state.u[..model.n_free], offsets: Offsets::Padded(offsets), touch }
     }
 
-    /// The contact with the skin laid out around its place.
+    /// The contact with the skin laid out around its contact point.
     #[inline(always)]
-    pub(crate) fn at(&self, place: &Place, layout: &'a [[F; 2]]) -> Situation<'a> {
-        let frame = &place.frame;
+    pub(crate) fn at(&self, framed: &FramedPoint, layout: &'a [[F; 2]]) -> Situation<'a> {
+        let frame = &framed.frame;
         let rows = [frame.tau.transpose(), frame.theta.transpose(), frame.normal.transpose()];
         Situation {
             displacements: self.displacements,
             offsets: self.offsets,
             layout,
-            contact_point: place.point.position.coords.cast(),
+            contact_point: framed.point.position.coords.cast(),
             frame: Matrix3::from_rows(&rows).cast(),
             tool_origin: self.touch.tool_origin.coords.cast(),
         }
     }
 }
 
-/// The coarse state, and the place of one contact.
+/// One contact with frame and layout.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Situation<'a> {
     /// Displacements of free nodes, in internal order \[m\].

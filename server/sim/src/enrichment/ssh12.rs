@@ -1,4 +1,4 @@
-//! The paper's correlation \[SSH12, 5.2\]: weights by the likeness of coarse displacement vectors.
+//! The paper's correlation \[SSH12, 5.2\]: weights by the similarity of coarse displacement vectors.
 //!
 //! Departures, with reasons in MATH.md: the kernel acts on the distance `x_i = 1 - r_i` (as printed, on `r_i`, an exact match would
 //! have no weight); it is shifted to reach zero, `G' = (G - e^-4) / (1 - e^-4)`; a null example of weight `g_0` fades detail out before
@@ -9,14 +9,14 @@ use crate::lanes::Node;
 use super::fade::Trust;
 use super::situation::Situation;
 
-/// What a user of the paper's method chooses.
+/// Options of the paper's method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ssh12Options {
-    /// Examples that are mixed: `sigma` is the mean distance to so many nearest ones.
+    /// Number of nearest examples whose mean distance is `sigma`.
     pub n_mixed: usize,
     /// Weight of the null example; 0 reproduces the paper.
     pub null_weight: f64,
-    /// Whether the kernel acts on `r_i`, as Eq. 10 is printed. To show what that does.
+    /// Whether the kernel acts on `r_i`, as Eq. 10 is printed; for comparison.
     pub literal: bool,
 }
 
@@ -28,14 +28,14 @@ impl Default for Ssh12Options {
 
 /// Largest `|u| / |u[i]|`.
 const LARGEST_RATIO: f32 = 1.25;
-/// Weights that are kept.
+/// Number of weights that are kept.
 const KEPT: usize = 10;
 /// Least `sigma`.
 const LEAST_WIDTH: f64 = 0.02;
 /// `e^-4`: the kernel at the end of its support, `x = 2 sigma`.
 const AT_END: f32 = 0.018_315_64;
 
-/// Weights by the paper.
+/// Tables of the paper's correlation.
 #[derive(Debug, Clone)]
 pub(crate) struct Ssh12 {
     options: Ssh12Options,
@@ -57,7 +57,7 @@ impl Ssh12 {
         Self { options, directions: directions.concat(), lengths, sigma }
     }
 
-    /// Writes `w`, which fade by themselves: the confidence is what the null example leaves.
+    /// Writes `w`, which fade through the null example; the confidence is the share that it leaves.
     pub(crate) fn weigh(&self, situation: &Situation<'_>, weights: &mut [f32]) -> Trust {
         let (u, n_free) = (situation.displacements, situation.displacements.len());
         let own = length(u);

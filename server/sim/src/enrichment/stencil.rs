@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 use plica_geometry::{ReferenceSkin, VertexIdx};
 
-use super::charts::anchors;
+use super::layout::anchors;
 use super::situation::Situation;
 
 /// Points per axis.
@@ -15,16 +15,16 @@ const N: usize = 5;
 pub(crate) const N_FEATURES: usize = 3 * N * N;
 /// Sample vertices per pitch.
 const SAMPLES: f64 = 3.0;
-/// A stencil point with less than this share of a pitch squared under it counts for less.
+/// Area around a stencil point below which it is weighted down, as a share of the squared pitch.
 const LEAST_AREA: f32 = 0.25;
 
-/// A vertex that is looked at.
+/// A sample vertex.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
-    /// At rest \[m\].
+    /// Rest position \[m\].
     position: Vector3<f32>,
     vertex: u32,
-    /// Around it \[m2\].
+    /// Area around the vertex \[m2\].
     area: f32,
 }
 
@@ -67,7 +67,7 @@ impl Stencil {
         let mut sums = [Vector3::<f32>::zeros(); N * N];
         let mut areas = [0.0_f32; N * N];
         let middle = (N / 2) as f32;
-        // What is farther away than the corner of the stencil is farther along the skin, too.
+        // Distance along the skin is at least the straight one: vertices beyond the stencil's corner are skipped.
         let reach = (2.0_f32.sqrt() * self.pitch * (middle + 1.0)).powi(2);
         let is_near = |sample: &&Sample| (sample.position - situation.contact_point).norm_squared() < reach;
         for &Sample { vertex, area, .. } in self.samples.iter().filter(is_near) {

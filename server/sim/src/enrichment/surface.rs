@@ -1,4 +1,4 @@
-//! The skin at rest, as enrichment asks for it: the nearest vertex, the frame at a contact point.
+//! Skin at rest: search for the nearest vertex, frame at a contact point.
 
 use nalgebra::{Point3, Vector3};
 use plica_geometry::{CLUSTER_SIZE, ContactFrame, ReferenceSkin, Skin, SurfacePoint, TriangleIdx, VertexIdx};
@@ -11,19 +11,26 @@ pub(crate) struct Surface {
     reference: ReferenceSkin,
     /// Triangles around each vertex.
     fans: Vec<Vec<TriangleIdx>>,
-    /// Of each cluster of vertices, low and high corner \[m\].
+    /// Low and high corner of each cluster of vertices \[m\].
     boxes: Vec<[Point3<f64>; 2]>,
     rest: Planar,
     normals: Planar,
     axes: [Vector3<f64>; 2],
 }
 
-/// A contact point with its frame on the reference skin.
+/// A contact point on the reference skin, with its frame.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Place {
+pub(crate) struct FramedPoint {
     pub(crate) point: SurfacePoint,
     pub(crate) corners: [VertexIdx; 3],
     pub(crate) frame: ContactFrame,
+}
+
+/// Nearest vertex found so far.
+struct NearestVertex {
+    vertex: usize,
+    /// Squared distance \[m^2\].
+    squared: f64,
 }
 
 impl Surface {
@@ -67,34 +74,34 @@ impl Surface {
     }
 
     /// The point of the skin next to a contact point: among the triangles around the nearest vertex.
-    pub(crate) fn place(&self, contact_point: &Point3<f64>) -> Place {
+    pub(crate) fn framed_point(&self, contact_point: &Point3<f64>) -> FramedPoint {
         let vertex = self.nearest(contact_point);
         let point = self.reference.nearest_around(contact_point, &self.fans[vertex]);
         let point = point.unwrap_or_else(|| unreachable!("every vertex of a skin has triangles"));
         let corners = self.reference.skin().triangles()[point.triangle.index()];
-        Place { corners, frame: self.reference.frame(&point, &self.axes), point }
+        FramedPoint { corners, frame: self.reference.frame(&point, &self.axes), point }
     }
 
-    /// The vertex nearest to a point: clusters whose boxes are farther away than what is known are passed over.
+    /// The vertex nearest to a point; skips clusters whose boxes are farther away than the best vertex so far.
     pub(crate) fn nearest(&self, p: &Point3<f64>) -> usize {
         let squared = |[low, high]: &[Point3<f64>; 2]| (p - p.sup(low).inf(high)).norm_squared();
         let first = (0..self.boxes.len()).min_by(|a, b| squared(&self.boxes[*a]).total_cmp(&squared(&self.boxes[*b])));
-        let mut best = (f64::INFINITY, 0);
-        self.look_into(first.unwrap_or(0), p, &mut best);
+        let mut best = NearestVertex { vertex: 0, squared: f64::INFINITY };
+        self.search_cluster(first.unwrap_or(0), p, &mut best);
         for (cluster, bounds) in self.boxes.iter().enumerate() {
-            if squared(bounds) < best.0 {
-                self.look_into(cluster, p, &mut best);
+            if squared(bounds) < best.squared {
+                self.search_cluster(cluster, p, &mut best);
             }
         }
-        best.1
+        best.vertex
     }
 
-    fn look_into(&self, cluster: usize, p: &Point3<f64>, best: &mut (f64, usize)) {
+    fn search_cluster(&self, cluster: usize, p: &Point3<f64>, best: &mut NearestVertex) {
         let first = cluster * CLUSTER_SIZE;
         for (lane, q) in self.reference.skin().positions()[first..].iter().take(CLUSTER_SIZE).enumerate() {
             let squared = (p - q).norm_squared();
-            if squared < best.0 {
-                *best = (squared, first + lane);
+            if squared < best.squared {
+                *best = NearestVertex { vertex: first + lane, squared };
             }
         }
     }

@@ -1,8 +1,9 @@
-//! Each example looked up at a place between the same vertex and the same place relative to the contact.
+//! Warp: each example is looked up between the same vertex and the same chart coordinates.
 //!
 //! With the charts of the present contact point, `q`, and of the example's, `q_i`, the vertex `p` gets
-//! `D_i(q_i^-1(q_i(p) + W (q(p) - q_i(p))))`: near the contact a stamp that needs no texels, far from it the vector method, without
-//! the ghost of a dent between. Costs a search per example and vertex: for comparison, not for 1 kHz.
+//! `D_i(q_i^-1(q_i(p) + W (q(p) - q_i(p))))`: near the contact a stamp that needs no texels, far from it the vector
+//! method, without the ghost of an indentation between. Needs a search per example and vertex: for comparison, too slow
+//! for 1 kHz.
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 use plica_geometry::Skin;
@@ -17,7 +18,7 @@ use crate::lanes::Node;
 const LEAST_SHARE: f32 = 1e-3;
 /// Cells per side of the search grid.
 const CELLS: usize = 64;
-/// How far outside a triangle still counts as in it, in barycentric weights.
+/// Tolerance of a triangle's inside, in barycentric weights.
 const SLACK: f32 = 1e-4;
 
 /// All examples with their charts.
@@ -35,7 +36,7 @@ struct Example {
     frame: Matrix3<f32>,
     /// `q_i`, `[n_skin]` \[m\].
     at: Vec<Vector2<f32>>,
-    /// Triangles that touch each cell of the chart.
+    /// Triangles that overlap each cell of the chart.
     cells: Vec<Vec<u32>>,
 }
 
@@ -52,7 +53,7 @@ impl Warp {
         this
     }
 
-    /// Triangles by the cells that they touch.
+    /// Triangles by the cells that they overlap.
     fn sort(&self, skin: &Skin, at: &[Vector2<f32>]) -> Vec<Vec<u32>> {
         let mut cells = vec![Vec::new(); CELLS * CELLS];
         for (t, corners) in self.triangles.iter().enumerate() {
@@ -112,11 +113,11 @@ impl Warp {
         if inside == 0.0 || own.amax() >= self.radius {
             return here;
         }
-        let place = own + (q - own) * inside;
-        let candidates = &example.cells[self.cell(place.x) * CELLS + self.cell(place.y)];
+        let target = own + (q - own) * inside;
+        let candidates = &example.cells[self.cell(target.x) * CELLS + self.cell(target.y)];
         let found = candidates.iter().find_map(|&t| {
             let corners = self.triangles[t as usize].map(|v| v as usize);
-            let weights = barycentric(&place, corners.map(|v| example.at[v]))?;
+            let weights = barycentric(&target, corners.map(|v| example.at[v]))?;
             Some(corners.iter().zip(weights).map(|(v, w)| example.detail[*v] * w).sum())
         });
         found.unwrap_or(here)

@@ -1,6 +1,6 @@
 //! Block Jacobi: the inverse 3x3 diagonal blocks of the rest matrix.
 
-use super::RestMatrix;
+use super::rest_matrix::RestMatrix;
 use crate::lanes::Node;
 
 /// Inverse diagonal blocks, one row of three nodes' worth of floats per axis.

@@ -6,7 +6,8 @@
 
 use nalgebra::DMatrix;
 
-use super::{NodeOrder, RestMatrix};
+use super::ordering::NodeOrder;
+use super::rest_matrix::RestMatrix;
 use crate::lanes::{F, LANES, Node};
 
 /// Dense column-major panel whose rows are padded to a multiple of [`LANES`].

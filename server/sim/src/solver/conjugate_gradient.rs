@@ -17,16 +17,16 @@ impl CgScratch {
     }
 }
 
-/// When to stop.
+/// Stopping criteria.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CgStop {
     /// Norm of the residual at which the solve has converged \[N s\].
     pub(crate) residual: f32,
-    /// Most iterations.
+    /// Largest number of iterations.
     pub(crate) max_iterations: u32,
 }
 
-/// How it went.
+/// Statistics of a solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CgInfo {
     pub(crate) iterations: u32,
@@ -56,7 +56,7 @@ pub(crate) fn conjugate_gradient(
         precondition(r, &mut scratch.z);
         let rho_before = std::mem::replace(&mut rho, dot(r, &scratch.z));
         if iteration == 0 {
-            // A copy, as zero times the direction of a solve that went wrong may not be zero.
+            // Copied, since zero times a non-finite direction is not zero.
             scratch.p[..n_free].copy_from_slice(&scratch.z);
         } else {
             scale_and_add(&mut scratch.p[..n_free], rho / rho_before, &scratch.z);

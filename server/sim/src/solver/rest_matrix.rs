@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 
 use nalgebra::Matrix3;
-use plica_geometry::HexMesh;
 
-use super::NodeOrder;
-use crate::description::{ElementKind, Material};
+use super::ordering::NodeOrder;
+use crate::description::ModelDescription;
 use crate::element::rest_stiffness;
 
 /// Symmetric block-sparse matrix; `rows[i][j]` is the 3x3 block of free nodes `i`, `j` \[kg\].
@@ -17,18 +16,12 @@ pub(crate) struct RestMatrix {
 
 impl RestMatrix {
     /// `node_mass` is `[n_nodes]` in internal order \[kg\]; `h` the step \[s\].
-    pub(crate) fn new(
-        mesh: &HexMesh,
-        order: &NodeOrder,
-        node_mass: &[f64],
-        materials: &[Material],
-        kind: ElementKind,
-        (h, mass_damping): (f64, f64),
-    ) -> Self {
+    pub(crate) fn new(description: &ModelDescription, order: &NodeOrder, node_mass: &[f64], h: f64) -> Self {
+        let ModelDescription { mesh, materials, element, mass_damping_per_s: mass_damping, .. } = description;
         let n_free = order.n_free();
         let mut rows: Vec<BTreeMap<usize, Matrix3<f64>>> = vec![BTreeMap::new(); n_free];
         for (hex, material) in mesh.hexes().iter().zip(materials) {
-            let stiffness = rest_stiffness(&hex.map(|n| mesh.nodes()[n.index()]), material, kind);
+            let stiffness = rest_stiffness(&hex.map(|n| mesh.nodes()[n.index()]), material, *element);
             let internal = hex.map(|n| order.internal_of_mesh[n.index()] as usize);
             for (a, &i) in internal.iter().enumerate().filter(|&(_, &i)| i < n_free) {
                 for (b, &j) in internal.iter().enumerate().filter(|&(_, &j)| j < n_free) {

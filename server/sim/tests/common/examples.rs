@@ -1,4 +1,4 @@
-//! Examples of a wedge whose "accurate" skin is given by a formula: fast to make, and known everywhere.
+//! Examples of a wedge with an "accurate" skin from a formula: cheap, and known everywhere.
 
 use nalgebra::{Point3, Vector3};
 use plica_sim::enrichment::*;
@@ -7,7 +7,7 @@ use super::*;
 
 pub const RADIUS: f64 = 0.007;
 
-/// One press with everything known about it.
+/// One press with its state, skins and contact point.
 #[derive(Clone)]
 pub struct Press {
     pub displacements: Vec<[f32; 3]>,
@@ -62,7 +62,7 @@ pub fn press_of(run: &Run) -> Press {
     }
 }
 
-/// The smeared dent taken back away from the contact, a bulge around it, and a part that grows with the square.
+/// Reduction of the smeared indentation away from the contact, a bulge around it, and a quadratic part.
 pub fn truth(run: &Run, contact: &Point3<f64>) -> Vec<Vector3<f64>> {
     let skin = &run.model.description().skin;
     let offsets = run.offsets();
@@ -87,7 +87,7 @@ pub fn examples(presses: &[Press]) -> Examples {
     }
 }
 
-/// An enricher with what it takes to evaluate it.
+/// An enricher with state and scratch for evaluations.
 pub struct Bench {
     pub enricher: Enricher,
     pub model: Model,
@@ -127,13 +127,13 @@ impl Bench {
         self.enrich_at(&press.touch)
     }
 
-    /// Detail of the present state for a touch.
+    /// Detail of the present state for a contact.
     pub fn enrich_at(&mut self, touch: &Touch) -> f32 {
         let Self { enricher, model, state, scratch, offsets, detail, .. } = self;
         enricher.evaluate(&Contact::new(model, state, offsets, touch), scratch, detail)
     }
 
-    /// Detail of the `i`-th example alone, at its own place.
+    /// Detail of the `i`-th example alone, at its own contact point.
     pub fn reproduce(&mut self, presses: &[Press], i: usize) {
         self.set(&presses[i], 1.0);
         let mut weights = vec![0.0; presses.len()];
@@ -142,7 +142,7 @@ impl Bench {
         enricher.interpolate(&Contact::new(model, state, offsets, &presses[i].touch), &weights, scratch, detail);
     }
 
-    /// Distance of the detail from what it should be, at each vertex [m].
+    /// Error of the detail at each vertex [m].
     pub fn misses(&self, press: &Press) -> Vec<f64> {
         let miss = |(a, b): (&[f32; 4], &[f32; 3])| -> f64 {
             (0..3).map(|k| f64::from(a[k] - b[k]).powi(2)).sum::<f64>().sqrt()

@@ -1,4 +1,4 @@
-//! Elastic forces of the run-time element kernels, read off one tick that is too short for anything else to happen.
+//! Elastic forces of the run-time element kernels, from one tick short enough to exclude all other effects.
 
 use nalgebra::Vector3;
 use plica_sim::*;
@@ -10,7 +10,7 @@ const INSTANT_S: f64 = 1e-6;
 /// Ticks in which the rotations, one warm step each, reach those of the displacements.
 const WARM_UP: usize = 24;
 
-/// A model without dampers and tools whose ticks last an instant.
+/// A model without dampers and tools, with very short ticks.
 pub fn instantaneous(scene: Scene) -> Model {
     let scene = scene.timestep(INSTANT_S).with(|d| {
         d.mass_damping_per_s = 0.0;

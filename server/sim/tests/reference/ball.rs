@@ -201,7 +201,7 @@ fn only(w: &DMatrix<f64>, b: &DVector<f64>, active: &[usize]) -> Option<DVector<
     (n > 0).then(|| block.cholesky().unwrap().solve(&DVector::from_fn(n, |i, _| -b[active[i]])))
 }
 
-/// Weights of the triangle's point nearest to `p` [Ericson05, 5.1.5]; exactly zero for corners that carry nothing.
+/// Weights of the triangle's point nearest to `p` [Ericson05, 5.1.5]; exactly zero for corners without a share.
 fn nearest_weights(p: Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> [f64; 3] {
     let normal = (b - a).cross(&(c - a));
     let area = |q: &Point3<f64>, r: &Point3<f64>| (q - p).cross(&(r - p)).dot(&normal) / normal.norm_squared();

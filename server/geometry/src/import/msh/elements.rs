@@ -15,8 +15,8 @@ pub(super) struct Element {
 /// Import of an element type.
 #[derive(Debug)]
 pub(super) enum Kind {
-    /// It is taken by its corners.
-    Taken(Shape),
+    /// Read by its corners.
+    Supported(Shape),
     /// Another volume of first order.
     OtherVolume,
     /// A volume with nodes on its edges.
@@ -39,8 +39,8 @@ impl Element {
     }
 }
 
-const fn taken(code: i32, name: &'static str, n_nodes: usize, shape: Shape) -> Element {
-    Element { code, name, n_nodes, kind: Kind::Taken(shape) }
+const fn supported(code: i32, name: &'static str, n_nodes: usize, shape: Shape) -> Element {
+    Element { code, name, n_nodes, kind: Kind::Supported(shape) }
 }
 
 const fn other(code: i32, name: &'static str, n_nodes: usize) -> Element {
@@ -51,22 +51,22 @@ const fn high(code: i32, name: &'static str, n_nodes: usize) -> Element {
     Element { code, name, n_nodes, kind: Kind::HighOrder }
 }
 
-/// The types that Gmsh writes up to third order; corners come first in each.
+/// Types that Gmsh writes up to third order; corners come first in each.
 const ELEMENTS: [Element; 30] = [
-    taken(15, "points", 1, Shape::Point),
-    taken(1, "2-node lines", 2, Shape::Line),
-    taken(8, "3-node lines", 3, Shape::Line),
-    taken(26, "4-node lines", 4, Shape::Line),
-    taken(27, "5-node lines", 5, Shape::Line),
-    taken(2, "3-node triangles", 3, Shape::Triangle),
-    taken(9, "6-node triangles", 6, Shape::Triangle),
-    taken(20, "9-node triangles", 9, Shape::Triangle),
-    taken(21, "10-node triangles", 10, Shape::Triangle),
-    taken(3, "4-node quads", 4, Shape::Quad),
-    taken(10, "9-node quads", 9, Shape::Quad),
-    taken(16, "8-node quads", 8, Shape::Quad),
-    taken(36, "16-node quads", 16, Shape::Quad),
-    taken(5, "8-node hexahedra", 8, Shape::Hexahedron),
+    supported(15, "points", 1, Shape::Point),
+    supported(1, "2-node lines", 2, Shape::Line),
+    supported(8, "3-node lines", 3, Shape::Line),
+    supported(26, "4-node lines", 4, Shape::Line),
+    supported(27, "5-node lines", 5, Shape::Line),
+    supported(2, "3-node triangles", 3, Shape::Triangle),
+    supported(9, "6-node triangles", 6, Shape::Triangle),
+    supported(20, "9-node triangles", 9, Shape::Triangle),
+    supported(21, "10-node triangles", 10, Shape::Triangle),
+    supported(3, "4-node quads", 4, Shape::Quad),
+    supported(10, "9-node quads", 9, Shape::Quad),
+    supported(16, "8-node quads", 8, Shape::Quad),
+    supported(36, "16-node quads", 16, Shape::Quad),
+    supported(5, "8-node hexahedra", 8, Shape::Hexahedron),
     other(4, "4-node tetrahedra", 4),
     other(6, "6-node prisms", 6),
     other(7, "5-node pyramids", 5),

@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use crate::import::error::{DAMAGED, Fault, Place, fault};
 
-/// Reads from the front; never beyond the end.
+/// Sequential reader of bytes; never reads beyond the end.
 pub(super) struct Reader<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -44,17 +44,17 @@ impl<'a> Reader<'a> {
         self.is_binary
     }
 
-    /// Where the reader stands, for messages.
+    /// Place of the reader, for messages.
     pub(super) fn place(&self) -> Place {
         if self.is_binary {
             return Place::Byte(self.at);
         }
-        // What was read last may have ended its line.
+        // The last item read may have ended its line.
         let read = self.bytes[..self.at].trim_ascii_end();
         Place::Line(1 + read.iter().filter(|b| **b == b'\n').count())
     }
 
-    /// Most items of at least `bytes` each in the rest of the file: a bound on allocations.
+    /// Largest number of items of at least `bytes` each in the rest of the file: bounds allocations.
     pub(super) fn room_for(&self, n: u64, bytes: usize) -> usize {
         usize::try_from(n).unwrap_or(usize::MAX).min((self.bytes.len() - self.at) / bytes)
     }
@@ -73,7 +73,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Goes to the next line that begins with `$` and gives the rest of it; `None` at the end of the file.
+    /// Advances to the next line that begins with `$` and returns the rest of it; `None` at the end of the file.
     pub(super) fn next_section(&mut self) -> Result<Option<&'a str>, Fault> {
         while !self.bytes[self.at..].trim_ascii().is_empty() {
             let line = self.line()?;
@@ -87,7 +87,7 @@ impl<'a> Reader<'a> {
         Ok(None)
     }
 
-    /// Passes over a section of no interest.
+    /// Skips a section.
     pub(super) fn skip_section(&mut self, name: &str) -> Result<(), Fault> {
         let end = format!("$End{name}");
         let rest = &self.bytes[self.at..];
@@ -109,18 +109,18 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Reads the number 1 that tells the byte order; numbers are binary from here on.
+    /// Reads the number 1 that marks the byte order; numbers are binary from here on.
     pub(super) fn start_binary(&mut self) -> Result<(), Fault> {
         self.is_binary = true;
         let one = self.take(4)?;
         self.is_big_endian = one == 1_i32.to_be_bytes();
         if !self.is_big_endian && one != 1_i32.to_le_bytes() {
-            return fault(self.place(), "the number that tells the byte order is not 1", DAMAGED);
+            return fault(self.place(), "the byte-order number is not 1", DAMAGED);
         }
         Ok(())
     }
 
-    /// A number as the file's mode has it.
+    /// A number in the file's mode.
     pub(super) fn number<T: Number>(&mut self) -> Result<T, Fault> {
         if !self.is_binary {
             let word = self.word()?;
@@ -138,7 +138,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// A count as text on its own line, whatever the file's mode.
+    /// A count as text on its own line, in both modes.
     pub(super) fn count_line(&mut self) -> Result<u64, Fault> {
         let line = self.line()?;
         self.parsed(line, u64::NAME)

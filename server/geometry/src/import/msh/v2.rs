@@ -2,60 +2,60 @@
 
 use nalgebra::Point3;
 
+use super::MshContent;
 use super::elements::Element;
 use super::reader::Reader;
-use super::{Fault, Tale, fault};
-use crate::import::error::DAMAGED;
+use crate::import::error::{DAMAGED, Fault, fault};
 
 /// `$Nodes`: a count as text, then tag and position of every node.
-pub(super) fn read_nodes(tale: &mut Tale, reader: &mut Reader<'_>) -> Result<(), Fault> {
+pub(super) fn read_nodes(content: &mut MshContent, reader: &mut Reader<'_>) -> Result<(), Fault> {
     let n_nodes = reader.count_line()?;
     let room = reader.room_for(n_nodes, 8);
-    tale.points.reserve(room);
-    tale.point_of_tag.reserve(room);
+    content.points.reserve(room);
+    content.point_of_tag.reserve(room);
     for _ in 0..n_nodes {
         let tag = tag(reader)?;
         let x = Point3::new(reader.number()?, reader.number()?, reader.number()?);
-        tale.add_point(reader, tag, x)?;
+        content.add_point(reader, tag, x)?;
     }
     reader.end_section("Nodes")
 }
 
 /// `$Elements`: a count as text, then the elements; in binary files in runs of one type and one number of group tags.
-pub(super) fn read_elements(tale: &mut Tale, reader: &mut Reader<'_>) -> Result<(), Fault> {
+pub(super) fn read_elements(content: &mut MshContent, reader: &mut Reader<'_>) -> Result<(), Fault> {
     let n_elements = reader.count_line()?;
-    tale.cells.reserve(reader.room_for(n_elements, 8));
+    content.cells.reserve(reader.room_for(n_elements, 8));
     let mut n_read = 0;
     while n_read < n_elements {
-        n_read += if reader.is_binary() { read_run(tale, reader)? } else { read_one(tale, reader)? };
+        n_read += if reader.is_binary() { read_run(content, reader)? } else { read_one(content, reader)? };
     }
     reader.end_section("Elements")
 }
 
 /// `type count n_tags`, then `tag groups.. nodes..` of each.
-fn read_run(tale: &mut Tale, reader: &mut Reader<'_>) -> Result<u64, Fault> {
+fn read_run(content: &mut MshContent, reader: &mut Reader<'_>) -> Result<u64, Fault> {
     let element = element(reader)?;
     let n_in_run = count(reader)?;
     let n_tags = count(reader)?;
     for _ in 0..n_in_run {
         let number = tag(reader)?;
-        read_rest(tale, reader, element, number, n_tags)?;
+        read_rest(content, reader, element, number, n_tags)?;
     }
     Ok(n_in_run)
 }
 
 /// `tag type n_tags groups.. nodes..`
-fn read_one(tale: &mut Tale, reader: &mut Reader<'_>) -> Result<u64, Fault> {
+fn read_one(content: &mut MshContent, reader: &mut Reader<'_>) -> Result<u64, Fault> {
     let number = tag(reader)?;
     let element = element(reader)?;
     let n_tags = count(reader)?;
-    read_rest(tale, reader, element, number, n_tags)?;
+    read_rest(content, reader, element, number, n_tags)?;
     Ok(1)
 }
 
 /// Group tags, the first of which is the physical group, and nodes.
 fn read_rest(
-    tale: &mut Tale,
+    content: &mut MshContent,
     reader: &mut Reader<'_>,
     element: &'static Element,
     number: u64,
@@ -70,7 +70,7 @@ fn read_rest(
     for node in &mut nodes {
         *node = tag(reader)?;
     }
-    tale.add_element(reader, element, number, &nodes, &[physical])
+    content.add_element(reader, element, number, &nodes, &[physical])
 }
 
 fn element(reader: &mut Reader<'_>) -> Result<&'static Element, Fault> {
@@ -85,7 +85,7 @@ fn tag(reader: &mut Reader<'_>) -> Result<u64, Fault> {
     count(reader)
 }
 
-/// A number from 0 that the file holds as a signed one.
+/// A non-negative number stored as a signed one.
 fn count(reader: &mut Reader<'_>) -> Result<u64, Fault> {
     let number = reader.number::<i32>()?;
     match u64::try_from(number) {

@@ -2,13 +2,13 @@
 
 use nalgebra::Point3;
 
+use super::MshContent;
 use super::elements::Element;
 use super::reader::Reader;
-use super::{Fault, Tale, fault};
-use crate::import::error::DAMAGED;
+use crate::import::error::{DAMAGED, Fault, fault};
 
 /// `$Entities`: points, curves, surfaces, volumes, each with its box, physical groups and boundary.
-pub(super) fn read_entities(tale: &mut Tale, reader: &mut Reader<'_>) -> Result<(), Fault> {
+pub(super) fn read_entities(content: &mut MshContent, reader: &mut Reader<'_>) -> Result<(), Fault> {
     let mut counts = [0; 4];
     for count in &mut counts {
         *count = reader.number::<u64>()?;
@@ -21,7 +21,7 @@ pub(super) fn read_entities(tale: &mut Tale, reader: &mut Reader<'_>) -> Result<
                 reader.number::<f64>()?;
             }
             let physical = read_tags(reader)?;
-            tale.physical_of_entity.insert((dimension, tag), physical);
+            content.physical_of_entity.insert((dimension, tag), physical);
             if dimension > 0 {
                 read_tags(reader)?;
             }
@@ -30,18 +30,18 @@ pub(super) fn read_entities(tale: &mut Tale, reader: &mut Reader<'_>) -> Result<
     reader.end_section("Entities")
 }
 
-/// A count and as many numbers.
+/// A count, then that many numbers.
 fn read_tags(reader: &mut Reader<'_>) -> Result<Vec<i32>, Fault> {
     let n = reader.number::<u64>()?;
     (0..n).map(|_| reader.number()).collect()
 }
 
 /// `$Nodes`: per block first the tags, then the positions, each followed by parameters where the block says so.
-pub(super) fn read_nodes(tale: &mut Tale, reader: &mut Reader<'_>) -> Result<(), Fault> {
+pub(super) fn read_nodes(content: &mut MshContent, reader: &mut Reader<'_>) -> Result<(), Fault> {
     let [n_blocks, n_nodes, _, _] = read_header(reader)?;
     let room = reader.room_for(n_nodes, 8);
-    tale.points.reserve(room);
-    tale.point_of_tag.reserve(room);
+    content.points.reserve(room);
+    content.point_of_tag.reserve(room);
     for _ in 0..n_blocks {
         let dimension = reader.number::<i32>()?;
         let _entity = reader.number::<i32>()?;
@@ -57,16 +57,16 @@ pub(super) fn read_nodes(tale: &mut Tale, reader: &mut Reader<'_>) -> Result<(),
             for _ in 0..n_parameters {
                 reader.number::<f64>()?;
             }
-            tale.add_point(reader, tag, x)?;
+            content.add_point(reader, tag, x)?;
         }
     }
     reader.end_section("Nodes")
 }
 
 /// `$Elements`: per block the entity and the type, then every element's tag and nodes.
-pub(super) fn read_elements(tale: &mut Tale, reader: &mut Reader<'_>) -> Result<(), Fault> {
+pub(super) fn read_elements(content: &mut MshContent, reader: &mut Reader<'_>) -> Result<(), Fault> {
     let [n_blocks, n_elements, _, _] = read_header(reader)?;
-    tale.cells.reserve(reader.room_for(n_elements, 8));
+    content.cells.reserve(reader.room_for(n_elements, 8));
     for _ in 0..n_blocks {
         let entity = (reader.number::<i32>()?, reader.number::<i32>()?);
         let code = reader.number::<i32>()?;
@@ -74,20 +74,20 @@ pub(super) fn read_elements(tale: &mut Tale, reader: &mut Reader<'_>) -> Result<
         let Some(element) = Element::by_code(code) else {
             return fault(reader.place(), format!("element type {code} is not known"), "8-node hexahedra are read");
         };
-        let groups = tale.physical_of_entity.get(&entity).cloned().unwrap_or_default();
+        let groups = content.physical_of_entity.get(&entity).cloned().unwrap_or_default();
         let mut tags = vec![0; element.n_nodes];
         for _ in 0..n_in_block {
             let number = reader.number()?;
             for tag in &mut tags {
                 *tag = reader.number::<u64>()?;
             }
-            tale.add_element(reader, element, number, &tags, &groups)?;
+            content.add_element(reader, element, number, &tags, &groups)?;
         }
     }
     reader.end_section("Elements")
 }
 
-/// Numbers of blocks and things, least and largest tag.
+/// Numbers of blocks and entries, least and largest tag.
 fn read_header(reader: &mut Reader<'_>) -> Result<[u64; 4], Fault> {
     let header = [reader.number()?, reader.number()?, reader.number()?, reader.number()?];
     if header[1] > u64::from(u32::MAX) {

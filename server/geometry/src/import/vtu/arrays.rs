@@ -1,4 +1,4 @@
-//! The `<DataArray>`s of a VTU file: where their numbers are, and how many.
+//! `<DataArray>`s of a VTU file: location and number of their values.
 
 use std::borrow::Cow;
 
@@ -8,7 +8,7 @@ use super::blocks::{self, Compressor};
 use super::numbers::{NumberType, text_numbers};
 use crate::import::error::{DAMAGED, Fault, Place, fault};
 
-/// Where the numbers of arrays come from, and how they are written.
+/// Source and encoding of array values.
 pub(super) struct Source<'a> {
     appended: Option<Stream<'a>>,
     pub(super) is_big_endian: bool,
@@ -29,7 +29,7 @@ pub(super) struct Array<'a, 'input> {
     node: Node<'a, 'input>,
 }
 
-/// The text up to `<AppendedData`, made whole again, and the data behind its underscore, which need not be text.
+/// XML up to `<AppendedData`, closed again, and the data after its underscore, which need not be text.
 pub(super) fn split_appended(bytes: &[u8]) -> (Cow<'_, [u8]>, Option<Stream<'_>>) {
     const TAG: &[u8] = b"<AppendedData";
     let Some(at) = bytes.windows(TAG.len()).position(|window| window == TAG) else {
@@ -83,7 +83,7 @@ impl<'a> Source<'a> {
         Ok(values)
     }
 
-    /// Whole numbers from 0, `n` of them where that is known.
+    /// Non-negative integers, `n` of them if known.
     pub(super) fn indices(&self, array: &Array<'_, '_>, n: Option<usize>) -> Result<Vec<u64>, Fault> {
         let values = match self.stream(array)? {
             None => text_numbers::<u64>(array)?,
@@ -97,7 +97,7 @@ impl<'a> Source<'a> {
         Ok(values)
     }
 
-    /// The array's bytes; none where it is written as text.
+    /// Bytes of the array; `None` if written as text.
     fn stream<'s>(&'s self, array: &Array<'s, '_>) -> Result<Option<Stream<'s>>, Fault> {
         match array.node.attribute("format").unwrap_or("ascii") {
             "ascii" => Ok(None),

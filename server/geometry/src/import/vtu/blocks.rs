@@ -1,4 +1,4 @@
-//! Bytes of a VTU array: a header that tells their number, base64 undone, blocks decompressed.
+//! Bytes of a VTU array: size header, base64, compressed blocks.
 
 use std::io::Read;
 
@@ -9,14 +9,14 @@ use roxmltree::Node;
 use super::arrays::{Array, Source, Stream, place};
 use crate::import::error::{DAMAGED, Fault, fault};
 
-/// How blocks are compressed.
+/// Compression of blocks.
 #[derive(Clone, Copy)]
 pub(super) enum Compressor {
     Zlib,
     Lz4,
 }
 
-/// LZ4 makes no more than this of a byte.
+/// Largest expansion of a byte by LZ4.
 const MOST_LZ4_GROWTH: usize = 256;
 
 impl Compressor {
@@ -92,7 +92,7 @@ fn header(source: &Source<'_>, bytes: &[u8]) -> Option<Vec<usize>> {
     bytes.chunks_exact(source.header_bytes).map(number).collect()
 }
 
-/// The first bytes of a stream, in `parts` that may have been encoded one by one or together.
+/// First bytes of a stream in `parts`, encoded one by one or together.
 fn prefix(stream: &Stream<'_>, parts: &[usize]) -> Option<Vec<u8>> {
     let n_bytes = parts.iter().try_fold(0_usize, |sum, &part| sum.checked_add(part))?;
     match stream {
@@ -108,7 +108,7 @@ fn prefix(stream: &Stream<'_>, parts: &[usize]) -> Option<Vec<u8>> {
     }
 }
 
-/// Base64 that may hold several padded pieces, one after the other.
+/// Decodes base64 of one or several padded pieces.
 fn decode(text: &[u8]) -> Option<Vec<u8>> {
     let mut bytes = Vec::with_capacity(3 * (text.len() / 4));
     let mut rest = text;

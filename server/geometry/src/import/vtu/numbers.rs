@@ -5,7 +5,7 @@ use std::str::FromStr;
 use super::arrays::Array;
 use crate::import::error::{DAMAGED, Fault, fault};
 
-/// Types of numbers by their names in VTU files.
+/// Number types by their names in VTU files.
 #[derive(Clone, Copy)]
 pub(super) enum NumberType {
     Int8,
@@ -57,7 +57,7 @@ impl NumberType {
         })
     }
 
-    /// Whole numbers from 0; others are refused.
+    /// Non-negative integers; other values are refused.
     pub(super) fn to_u64(self, bytes: &[u8], is_big_endian: bool, array: &Array<'_, '_>) -> Result<Vec<u64>, Fault> {
         self.convert(bytes, is_big_endian, array, |word| match self {
             Self::Float32 | Self::Float64 => None,

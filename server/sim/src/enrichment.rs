@@ -1,10 +1,9 @@
-//! Enrichment: what the coarse skin misses, learned from examples \[SSH12, 5\].
+//! Enrichment: detail that the coarse skin lacks, learned from examples \[SSH12, 5\].
 //!
-//! For each contact the skin is laid out around the contact point (`charts.rs`), a correlator weighs the examples by their likeness
-//! to the present state, and an interpolator (`field.rs`) lays their detail on the skin. An [`Enricher`] is one such way with its
-//! tables; it never changes. A [`LiveEnrichment`] follows the contacts of a running simulation with one.
+//! For each contact the skin is laid out around the contact point (`layout.rs`), a correlator weighs the examples for
+//! the present state, and an interpolator (`field.rs`) adds their detail to the skin. An [`Enricher`] holds the
+//! constant tables of one enrichment method. A [`LiveEnrichment`] applies it to the contacts of a running simulation.
 
-mod charts;
 mod clearance;
 mod correlation;
 mod enricher;
@@ -15,6 +14,7 @@ mod field;
 mod groups;
 mod kriging;
 mod lattice;
+mod layout;
 mod linear;
 mod live;
 mod methods;
@@ -28,12 +28,12 @@ mod stencil;
 mod surface;
 mod warp;
 
-pub use charts::Coordinates;
 pub use enricher::{Enricher, EnricherScratch};
 pub use error::EnricherError;
 pub use examples::Examples;
 pub use field::{FieldOptions, Interpolator};
 pub use kriging::KrigingChoice;
+pub use layout::Coordinates;
 pub use linear::LinearKind;
 pub use live::LiveEnrichment;
 pub use methods::{DEFAULT_METHOD, FAMILIES, METHODS, NamedMethod};

@@ -1,8 +1,8 @@
 //! Frictional contact between the skin and tools or planes, imposed inside the implicit solve.
 //!
 //! [`solid`] knows shapes, [`detect`] finds skin points near them, [`rows`] turns them into constraint rows that keep their
-//! multipliers across ticks, [`law`] is the contact and friction law, [`proxy`] the coupled tools, [`coupling`] what the linear
-//! solver sees of all this, [`point`] the contact point on the reference skin.
+//! multipliers across ticks, [`law`] is the contact and friction law, [`proxy`] the coupled tools, [`coupling`] the
+//! contact operator of the linear solver, [`point`] the contact point on the reference skin.
 
 mod coupling;
 mod detect;
@@ -14,7 +14,7 @@ mod solid;
 mod surface;
 
 pub(crate) use coupling::ContactCoupling;
-pub(crate) use detect::{Candidate, Detector, Search};
+pub(crate) use detect::{Detector, Search};
 pub(crate) use law::{evaluate, predict_secant, settle, stack_forces};
 pub(crate) use point::{ContactPoint, contact_point};
 pub(crate) use proxy::{Proxy, ProxyMotion, at_arm};

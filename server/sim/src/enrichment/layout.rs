@@ -1,53 +1,54 @@
-//! Surface coordinates around a contact point that moves.
+//! Layout: surface coordinates around a moving contact point.
 //!
-//! Discrete exponential maps around some skin vertices, the anchors, are tabulated. Around a contact point `c`, the maps of its
-//! three nearest anchors are turned into the frame at `c`, shifted so that `c` is their origin, and blended:
+//! The atlas tabulates charts: discrete exponential maps around selected skin vertices, the anchors. Around a contact
+//! point `c`, the charts of the three nearest anchors are turned into the frame at `c`, shifted to the origin `c`, and
+//! blended:
 //!
 //! `q(p) = sum_k w_k R_k (q_k(p) - q_k(c))`
 //!
-//! On a surface that can be unfolded every term is the same; elsewhere the blend moves smoothly with `c`. Or, as in the paper,
-//! vertices are projected onto the tangent plane \[SSH12, 5.3\].
+//! On a developable surface all terms are equal; elsewhere the blend moves smoothly with `c`. The paper's layout is the
+//! alternative: vertices projected onto the tangent plane \[SSH12, 5.3\].
 
 use nalgebra::{Rotation2, Vector2, Vector3};
 use plica_geometry::{ContactFrame, ExponentialMaps, ReferenceSkin, VertexIdx};
 use wide::{i16x16, i32x16};
 
 use super::groups::{Groups, Planar};
-use super::surface::{Place, Surface};
+use super::surface::{FramedPoint, Surface};
 use crate::lanes::{F, LANES};
 
-/// Anchors that are blended.
+/// Number of blended anchors.
 const BLENDED: usize = 3;
-/// Anchors that a vertex knows.
-const KNOWN: usize = 8;
-/// Entry of a vertex that a map does not reach.
+/// Largest number of anchors tabulated for a vertex.
+const MAX_NEAR_ANCHORS: usize = 8;
+/// Entry of a vertex that a chart does not reach.
 const UNREACHED: i16 = i16::MIN;
-/// Coordinate of a vertex that a map does not reach, in units of its radius.
+/// Coordinate of a vertex that no chart reaches \[m\].
 pub(crate) const FAR: f32 = 1e6;
 
-/// How a skin is laid out around a contact point.
+/// Options of the layout around a contact point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ChartOptions {
-    /// Coordinates reach this far from the contact point \[m\].
+    /// Reach of coordinates around the contact point \[m\].
     pub radius_m: f64,
     /// Distance of anchors \[m\].
     pub anchor_spacing_m: f64,
     /// Vertices whose normals differ by more than this from that of the contact point are left out \[rad\].
     pub max_normal_angle: f64,
-    /// Geodesic, or projected.
+    /// Kind of coordinates.
     pub coordinates: Coordinates,
 }
 
-/// What the coordinates of a vertex are.
+/// Kind of coordinates of a vertex.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Coordinates {
-    /// Of the exponential map.
+    /// Geodesic, by the exponential map.
     Exponential,
-    /// Of the orthogonal projection onto the tangent plane \[SSH12\].
+    /// Projected orthogonally onto the tangent plane \[SSH12\].
     Orthogonal,
 }
 
-/// Tables of a skin.
+/// Atlas of a skin.
 #[derive(Debug, Clone)]
 pub(crate) struct Charts {
     options: ChartOptions,
@@ -57,16 +58,16 @@ pub(crate) struct Charts {
     /// `[anchor][group][axis]`
     rows: Vec<[i16x16; 2]>,
     /// Anchors around each vertex, nearest first.
-    known: Vec<Vec<Known>>,
+    near_anchors: Vec<Vec<NearAnchor>>,
 }
 
-/// An anchor as seen from a vertex.
+/// An anchor near a vertex, and the vertex in its chart.
 #[derive(Debug, Clone, Copy)]
-struct Known {
+struct NearAnchor {
     anchor: u32,
-    /// The vertex in the anchor's map \[m\].
+    /// Coordinates of the vertex in the anchor's chart \[m\].
     at: Vector2<f64>,
-    /// From the anchor's map to the frame at the vertex.
+    /// Rotation from the anchor's chart to the frame at the vertex.
     turn: Rotation2<f64>,
 }
 
@@ -91,7 +92,7 @@ impl Charts {
         let mut this = Self {
             unit: (reach / f64::from(i16::MAX)) as f32,
             rows: Vec::new(),
-            known: vec![Vec::new(); surface.n_vertices()],
+            near_anchors: vec![Vec::new(); surface.n_vertices()],
             groups: surface.groups(),
             options,
         };
@@ -116,14 +117,14 @@ impl Charts {
             mapped.iter().for_each(|(v, q)| at[v.index()] = Some(*q));
             for (v, q) in mapped.iter().take_while(|(_, q)| q.norm() < 3.0 * self.options.anchor_spacing_m) {
                 if let Some(turn) = turn(skin, &frames[v.index()], &neighbours[v.index()], v.index(), &at) {
-                    self.known[v.index()].push(Known { anchor: anchor as u32, at: *q, turn });
+                    self.near_anchors[v.index()].push(NearAnchor { anchor: anchor as u32, at: *q, turn });
                 }
             }
             self.push_row(&at);
         }
-        for known in &mut self.known {
+        for known in &mut self.near_anchors {
             known.sort_by(|a, b| a.at.norm_squared().total_cmp(&b.at.norm_squared()));
-            known.truncate(KNOWN);
+            known.truncate(MAX_NEAR_ANCHORS);
         }
     }
 
@@ -138,9 +139,9 @@ impl Charts {
         }
     }
 
-    /// Around a point of the reference skin. `None` where no map reaches.
-    pub(crate) fn at(&self, place: &Place) -> Option<ChartAt> {
-        let Place { corners, point, frame } = place;
+    /// Layout around a point of the reference skin; `None` where no chart reaches.
+    pub(crate) fn at(&self, contact: &FramedPoint) -> Option<ChartAt> {
+        let FramedPoint { corners, point, frame } = contact;
         let row = |v: &Vector3<f64>| [v.x as f32, v.y as f32, v.z as f32];
         let mut chart = ChartAt {
             terms: [(0, [[0.0; 2]; 2]); BLENDED],
@@ -154,16 +155,16 @@ impl Charts {
         }
         let mut found = Nearest::default();
         for corner in *corners {
-            for known in &self.known[corner.index()] {
+            for known in &self.near_anchors[corner.index()] {
                 if !found.holds(known.anchor)
-                    && let Some(known) = self.seen_from(known.anchor, *corners, point.weights)
+                    && let Some(known) = self.near_anchor(known.anchor, *corners, point.weights)
                 {
                     found.offer(known);
                 }
             }
         }
         let end = found.end()?;
-        let weight = |k: &Known| (1.0 - k.at.norm() / end).max(1e-6).powi(2);
+        let weight = |k: &NearAnchor| (1.0 - k.at.norm() / end).max(1e-6).powi(2);
         let total: f64 = found.blended().map(weight).sum();
         for (term, known) in chart.terms.iter_mut().zip(found.blended()) {
             let matrix = known.turn.matrix() * (weight(known) / total);
@@ -173,25 +174,25 @@ impl Charts {
             chart.offset[0] += shift.x as f32;
             chart.offset[1] += shift.y as f32;
         }
-        // Where fewer are known, the first stands in without weight.
+        // Missing anchors repeat the first, with weight zero.
         let n_known = found.blended().count();
         (n_known..BLENDED).for_each(|k| chart.terms[k].0 = chart.terms[0].0);
         Some(chart)
     }
 
-    /// An anchor as seen from a point of a triangle, if all corners know it.
-    fn seen_from(&self, anchor: u32, corners: [VertexIdx; 3], weights: [f64; 3]) -> Option<Known> {
+    /// An anchor near a point of a triangle, interpolated from the corners; `None` unless it is near all of them.
+    fn near_anchor(&self, anchor: u32, corners: [VertexIdx; 3], weights: [f64; 3]) -> Option<NearAnchor> {
         let (mut at, mut cos, mut sin) = (Vector2::zeros(), 0.0, 0.0);
         for (corner, weight) in corners.iter().zip(weights) {
-            let known = self.known[corner.index()].iter().find(|k| k.anchor == anchor)?;
+            let known = self.near_anchors[corner.index()].iter().find(|k| k.anchor == anchor)?;
             at += known.at * weight;
             cos += known.turn.matrix()[(0, 0)] * weight;
             sin += known.turn.matrix()[(1, 0)] * weight;
         }
-        Some(Known { anchor, at, turn: Rotation2::new(sin.atan2(cos)) })
+        Some(NearAnchor { anchor, at, turn: Rotation2::new(sin.atan2(cos)) })
     }
 
-    /// Coordinates of all vertices \[m\]; those that are not reached are far away.
+    /// Coordinates of all vertices \[m\]; [`FAR`] where no chart reaches.
     pub(crate) fn lay_out(&self, chart: &ChartAt, surface: &Surface, out: &mut [[F; 2]]) {
         match self.options.coordinates {
             Coordinates::Exponential => self.blend(chart, out),
@@ -239,10 +240,10 @@ impl Charts {
     }
 }
 
-/// The nearest anchors, nearest first; the last one only says where weights end.
+/// Anchors in order of distance; the last one bounds the support of the weights.
 #[derive(Default)]
 struct Nearest {
-    kept: [Option<Known>; BLENDED + 1],
+    kept: [Option<NearAnchor>; BLENDED + 1],
 }
 
 impl Nearest {
@@ -250,18 +251,18 @@ impl Nearest {
         self.kept.iter().flatten().any(|k| k.anchor == anchor)
     }
 
-    fn offer(&mut self, known: Known) {
+    fn offer(&mut self, known: NearAnchor) {
         let mut next = Some(known);
         for slot in &mut self.kept {
-            let is_nearer = |n: &Known| slot.is_none_or(|k: Known| n.at.norm() < k.at.norm());
+            let is_nearer = |n: &NearAnchor| slot.is_none_or(|k: NearAnchor| n.at.norm() < k.at.norm());
             if next.as_ref().is_some_and(is_nearer) {
                 std::mem::swap(slot, &mut next);
             }
         }
     }
 
-    /// Those that are blended.
-    fn blended(&self) -> impl Iterator<Item = &Known> + Clone {
+    /// Blended anchors.
+    fn blended(&self) -> impl Iterator<Item = &NearAnchor> + Clone {
         self.kept[..BLENDED].iter().flatten()
     }
 
@@ -272,7 +273,9 @@ impl Nearest {
     }
 }
 
-/// Farthest-point sampling of vertices until none is farther than `spacing_m` from one of them.
+/// Farthest-point sampling of vertices until none is farther than `spacing_m` from an anchor. Ties go to the last
+/// vertex; the sampling of training (`training/src/farthest.rs`) has a count, squared distances, and ties that go to
+/// the first, so that neither can replace the other without a change of results.
 pub(crate) fn anchors(skin: &ReferenceSkin, spacing_m: f64) -> Vec<VertexIdx> {
     let positions = skin.skin().positions();
     let mut distance = vec![f64::INFINITY; positions.len()];
@@ -301,7 +304,7 @@ fn neighbours(skin: &ReferenceSkin) -> Vec<Vec<usize>> {
     neighbours
 }
 
-/// The turn that takes edges at a vertex from a map to the frame at the vertex, in the least-squares sense.
+/// Rotation from a chart to the frame at a vertex, the least-squares fit to the edges there.
 fn turn(
     skin: &ReferenceSkin,
     frame: &ContactFrame,
@@ -344,7 +347,7 @@ mod tests {
     fn laid_out(surface: &Surface, charts: &Charts, contact: [f64; 2]) -> Vec<[f32; 2]> {
         let contact = Point3::new(contact[0], contact[1], Wedge::default().height_m(contact[0]));
         let mut layout = vec![[F::ZERO; 2]; surface.groups().n()];
-        charts.lay_out(&charts.at(&surface.place(&contact)).unwrap(), surface, &mut layout);
+        charts.lay_out(&charts.at(&surface.framed_point(&contact)).unwrap(), surface, &mut layout);
         (0..surface.n_vertices()).map(|v| coordinates(&layout, v)).collect()
     }
 
