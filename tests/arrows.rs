@@ -181,13 +181,14 @@ fn no_circle_of_folders() {
 }
 
 /// Names that are still taken through a parent; the number only falls.
-const N_THROUGH_PARENTS: usize = 49;
+const N_THROUGH_PARENTS: usize = 27;
 
 #[test]
 fn no_file_reaches_a_sibling_through_a_parent() {
     let found: Vec<_> = trees().iter().flat_map(through_parents).collect();
-    let n = found.len();
-    assert!(n <= N_THROUGH_PARENTS, "{n} names taken through a parent:\n{}", found.join("\n"));
+    let (n, list) = (found.len(), found.join("\n"));
+    println!("{n} names taken through a parent:\n{list}");
+    assert!(n <= N_THROUGH_PARENTS, "{n} names taken through a parent, {N_THROUGH_PARENTS} may be:\n{list}");
 }
 
 /// Names that a file takes from a module above it, which has them from elsewhere.

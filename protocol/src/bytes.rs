@@ -1,6 +1,7 @@
 //! Little-endian fields at fixed offsets, written and read in layout order.
 
-use crate::{DecodeError, VERSION};
+use crate::VERSION;
+use crate::error::DecodeError;
 
 /// Reads fields one after the other. The length is checked once, by [`open`], so reads are infallible after it.
 pub(crate) struct Fields<'a> {

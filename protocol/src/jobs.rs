@@ -241,8 +241,8 @@ pub struct JobProgress {
 
 impl JobProgress {
     /// Reads a message.
-    pub fn from_json(bytes: &[u8]) -> Result<Self, crate::DecodeError> {
-        serde_json::from_slice(bytes).map_err(|error| crate::DecodeError::Json(error.to_string()))
+    pub fn from_json(bytes: &[u8]) -> Result<Self, crate::error::DecodeError> {
+        serde_json::from_slice(bytes).map_err(|error| crate::error::DecodeError::Json(error.to_string()))
     }
 }
 

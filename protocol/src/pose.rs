@@ -5,8 +5,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::DecodeError;
 use crate::bytes::{Layout, finite, open_exact};
+use crate::error::DecodeError;
 use crate::keys::check_name;
 
 /// First bytes of a pose.

@@ -5,7 +5,7 @@
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::DecodeError;
+use crate::error::DecodeError;
 use crate::pose::{JsonPose, Pose, yes};
 
 /// Most ticks that one `step` may ask for; they must pass within a client's time-out.

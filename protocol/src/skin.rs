@@ -7,8 +7,8 @@
 
 use thiserror::Error;
 
-use crate::DecodeError;
 use crate::bytes::{Layout, finite, open};
+use crate::error::DecodeError;
 
 /// First bytes of a skin frame.
 pub const MAGIC: [u8; 4] = *b"PLSK";

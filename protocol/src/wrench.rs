@@ -1,7 +1,7 @@
 //! Forces on a tool, on their way out: `PLWR`, 192 bytes.
 
-use crate::DecodeError;
 use crate::bytes::{Layout, finite, open_exact};
+use crate::error::DecodeError;
 
 /// First bytes of a wrench.
 pub const MAGIC: [u8; 4] = *b"PLWR";

@@ -9,8 +9,9 @@ use plica_protocol::keys::{Keys, check_name};
 use plica_protocol::pose::Pose;
 use zenoh::{Session, Wait};
 
+use crate::error::ClientError;
+use crate::options::ClientOptions;
 use crate::publish::PosePublisher;
-use crate::{ClientError, ClientOptions};
 
 /// Zenoh's own close can hang for 10 s.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);

@@ -9,8 +9,10 @@ use plica_protocol::jobs::{
 };
 use sha2::{Digest, Sha256};
 
+use crate::client::Client;
+use crate::error::ClientError;
 use crate::query::{check_piece, check_sum, chunk_header};
-use crate::{Client, ClientError, Subscription};
+use crate::subscribe::Subscription;
 
 /// How long a submission may take: the daemon reads the scene and writes it to disk.
 const SUBMIT_TIMEOUT: Duration = Duration::from_secs(30);

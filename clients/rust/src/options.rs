@@ -6,7 +6,7 @@ use std::time::Duration;
 use plica_protocol::{DEFAULT_ENDPOINT, DEFAULT_SESSION};
 use zenoh::Config;
 
-use crate::ClientError;
+use crate::error::ClientError;
 
 /// Where and how to connect.
 #[derive(Debug, Clone)]

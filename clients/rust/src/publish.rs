@@ -10,7 +10,7 @@ use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Session, Wait};
 
-use crate::ClientError;
+use crate::error::ClientError;
 
 /// Publishes the poses of one tool.
 pub struct PosePublisher {

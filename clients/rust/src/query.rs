@@ -16,7 +16,9 @@ use zenoh::bytes::Encoding;
 use zenoh::query::{Reply, ReplyError};
 use zenoh::sample::Sample;
 
-use crate::{Client, ClientError, SkinMessage};
+use crate::client::Client;
+use crate::error::ClientError;
+use crate::subscribe::SkinMessage;
 
 /// Zenoh reports its own time-out as an error reply; this much later nothing comes any more.
 const GRACE: Duration = Duration::from_millis(500);

@@ -13,8 +13,9 @@ use zenoh::bytes::Encoding;
 use zenoh::pubsub::Subscriber;
 use zenoh::sample::Sample;
 
+use crate::client::Client;
+use crate::error::ClientError;
 use crate::queue::{Overflow, Queue, StreamStats};
-use crate::{Client, ClientError};
 
 /// A skin frame as it arrived.
 #[derive(Debug, Clone)]

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::Arrow;
+use super::crate_tree::Arrow;
 
 type Graph = BTreeMap<Vec<String>, BTreeSet<Vec<String>>>;
 
