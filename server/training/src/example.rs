@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::accurate::SolveInfo;
 use crate::coarse::Settling;
-use crate::interaction::Interaction;
 use plica_geometry::ContactFrame;
 use plica_sim::enrichment::Touch;
 
@@ -123,27 +122,6 @@ pub enum Reason {
     IndependentInverted,
     /// A number of the result is not finite.
     NotFinite,
-}
-
-impl Rejection {
-    /// An interaction that gives no example.
-    pub(crate) fn new(
-        (index, interaction_sha256): (u32, String),
-        interaction: &Interaction,
-        reason: Reason,
-        message: String,
-    ) -> Self {
-        Self {
-            index,
-            kind: interaction.kind.clone(),
-            reason,
-            message,
-            contact_point_m: interaction.contact_point_m,
-            depth_m: interaction.depth_m(),
-            drag_m: interaction.drag().into(),
-            interaction_sha256,
-        }
-    }
 }
 
 /// What became of an interaction.

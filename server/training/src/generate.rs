@@ -5,6 +5,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::Instant;
 
+use crate::accurate::AccurateSize;
 use crate::database::{About, Database, DatabaseKind};
 use crate::error::{PlanError, TrainingError};
 use crate::example::Outcome;
@@ -51,7 +52,7 @@ pub fn run(
     let n_resumed = interactions.len() - open.len();
     let n_threads = n_threads.clamp(1, open.len().max(1));
     let work = Work { setup, interactions: &interactions, open: &open, about: &about, kind: job.kind };
-    let sizes = work.run(n_threads, folder, &tally)?;
+    let size = work.run(n_threads, folder, &tally)?;
     tally.announce(TrainingStage::Database)?;
     let database = assemble(folder, &about, &fingerprints)?;
     let path = folder.paths().database();
@@ -67,7 +68,7 @@ pub fn run(
         resumed: n_resumed,
         ..tally.times()
     };
-    let report = TrainingReport::new(setup, &database, interactions.len(), sizes, run);
+    let report = TrainingReport::new(setup, &database, interactions.len(), size, run);
     folder.set_report(&report)?;
     Ok(report)
 }
@@ -94,23 +95,21 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// One sequential solve per thread, in the order of the plan. Sizes of the accurate model: unknowns, factor values.
-    fn run(
-        &self,
-        n_threads: usize,
-        folder: &TrainingFolder,
-        tally: &Tally<'_>,
-    ) -> Result<(usize, usize), TrainingError> {
+    /// One sequential solve per thread, in the order of the plan.
+    fn run(&self, n_threads: usize, folder: &TrainingFolder, tally: &Tally<'_>) -> Result<AccurateSize, TrainingError> {
         let threads = |e: rayon::ThreadPoolBuildError| TrainingError::Threads { n_threads, reason: e.to_string() };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().map_err(threads)?;
         let (next, failed) = (AtomicUsize::new(0), AtomicUsize::new(0));
-        let cancelled = || tally.is_cancelled() || failed.load(Relaxed) > 0;
         let worker = |_: rayon::BroadcastContext<'_>| {
             let mut tandem = Tandem::new(self.setup)?;
+            let mut observe = || match tally.observe() {
+                ControlFlow::Continue(()) if failed.load(Relaxed) == 0 => ControlFlow::Continue(()),
+                _ => ControlFlow::Break(()),
+            };
             while let Some(&index) = self.open.get(next.fetch_add(1, Relaxed)) {
                 let begin = Instant::now();
                 let two = self.kind == DatabaseKind::Evaluation;
-                let outcome = tandem.solve(index as u32, &self.interactions[index], two, &cancelled);
+                let outcome = tandem.solve(index as u32, &self.interactions[index], two, &mut observe);
                 let outcome = outcome.map_err(|_| TrainingError::Interrupted)?;
                 folder.store(self.about, &outcome)?;
                 tally.solved(&outcome, begin.elapsed().as_secs_f64())?;
@@ -205,11 +204,12 @@ impl<'a> Tally<'a> {
         Ok(())
     }
 
-    fn is_cancelled(&self) -> bool {
+    /// `Break` once the observer has ended the job.
+    fn observe(&self) -> ControlFlow<()> {
         let mut shared = self.shared();
         let progress = self.progress(&shared.counts, TrainingStage::Examples);
         shared.observe(progress);
-        shared.is_cancelled
+        if shared.is_cancelled { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
     fn progress(&self, counts: &Counts, stage: TrainingStage) -> TrainingProgress {

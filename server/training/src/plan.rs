@@ -24,7 +24,7 @@ pub fn plan(setup: &Setup, sets: &[InteractionSet], seed: u64) -> Result<Vec<Int
     let skin = ReferenceSkin::new(&setup.coarse.skin);
     let mut all = Vec::new();
     for (index, set) in sets.iter().enumerate() {
-        all.extend(draw_set(setup, &skin, set, (seed, index as u32))?);
+        all.extend(draw_set(setup, &skin, set, seed, index as u32)?);
     }
     Ok(all)
 }
@@ -33,14 +33,15 @@ fn draw_set(
     setup: &Setup,
     skin: &ReferenceSkin,
     set: &InteractionSet,
-    (seed, index): (u64, u32),
+    seed: u64,
+    set_index: u32,
 ) -> Result<Vec<Interaction>, PlanError> {
     let n_candidates = set.count * set.candidates_per_example.max(1);
     let candidates = match &set.source {
         Source::Press(ranges) | Source::Lift(ranges) => {
             let region = Region::new(skin, set, ranges)?;
             (0..n_candidates)
-                .map(|i| region.draw(setup, &mut Draws::new(seed, index, i as u32)))
+                .map(|i| region.draw(setup, &mut Draws::new(seed, set_index, i as u32)))
                 .collect::<Result<_, _>>()?
         }
         Source::Recorded(poses) => recorded::candidates(setup, skin, set, poses, seed)?,

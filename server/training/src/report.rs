@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use crate::accurate::SolveInfo;
+use crate::accurate::{AccurateSize, SolveInfo};
 use crate::database::{Database, DatabaseKind};
 use crate::example::{Example, Record, Rejection};
 use crate::setup::Setup;
@@ -107,14 +107,8 @@ pub struct Run {
 }
 
 impl TrainingReport {
-    /// Of a finished job; `sizes` are free unknowns and factor values of the accurate model.
-    pub(crate) fn new(
-        setup: &Setup,
-        database: &Database,
-        interactions: usize,
-        (accurate_unknowns, factor_values): (usize, usize),
-        run: Run,
-    ) -> Self {
+    /// Report of a finished job with `interactions` planned interactions.
+    pub(crate) fn new(setup: &Setup, database: &Database, interactions: usize, size: AccurateSize, run: Run) -> Self {
         let examples = &database.examples;
         let records = || examples.iter().map(|e| &e.record);
         let mut kinds = BTreeMap::new();
@@ -127,8 +121,8 @@ impl TrainingReport {
             examples: examples.len(),
             kinds,
             accurate_hexes: setup.accurate.mesh.n_hexes(),
-            accurate_unknowns,
-            factor_values,
+            accurate_unknowns: size.n_unknowns,
+            factor_values: size.n_factor_values,
             tied: Solves::of(records().map(|r| r.tied)),
             independent: Solves::of(records().filter_map(|r| r.independent)),
             settle_s: Spread::of(records().map(|r: &Record| r.settling.time_s)),

@@ -3,13 +3,15 @@
 //! The second difference `d[k-1] - 2 d[k] + d[k+1]` between states a small step apart is what an eye sees as jitter. The accurate
 //! solution has one of its own, since vertices enter and leave the contact.
 
+use std::ops::ControlFlow;
+
 use nalgebra::{Isometry3, Point3};
 use plica_sim::enrichment::Touch;
 use serde::{Deserialize, Serialize};
 
-use super::judge::{EvaluationError, Judge};
+use super::evaluator::{EvaluationError, Evaluator};
 use super::methods::Method;
-use super::progress::{Observer, Progress};
+use super::progress::{EvaluationObserver, EvaluationProgress};
 use super::statistics::Quantiles;
 use crate::coarse::Interrupted;
 use crate::error::TrainingError;
@@ -87,16 +89,16 @@ struct Station {
     tied: Vec<[f32; 3]>,
 }
 
-/// Slides from one end of the trained region to the other and compares `methods`, taught by the first `n_examples` examples.
+/// Slides from one end of the trained region to the other and compares `methods`, trained on the first `n_examples` examples.
 ///
 /// # Errors
 /// See [`SlideError`].
 pub fn slide(
     setup: &Setup,
-    judge: &Judge,
+    evaluator: &Evaluator,
     methods: &[Method],
     n_examples: usize,
-    observer: &mut Observer<'_>,
+    observer: &mut EvaluationObserver<'_>,
 ) -> Result<Slide, SlideError> {
     let (tool, poses) = poses(setup)?;
     let mut stations: Vec<Option<Station>> = Vec::new();
@@ -107,10 +109,10 @@ pub fn slide(
         tool,
         &poses,
         |tandem, half| {
-            if observer(Progress { done: stations.len(), all: poses.len(), part: "slide" }).is_break() {
+            if observer(EvaluationProgress { done: stations.len(), all: poses.len(), part: "slide" }).is_break() {
                 return Err(Interrupted);
             }
-            let tied = half.as_ref().map(|half| tandem.solve_tied(half, &|| false));
+            let tied = half.as_ref().map(|half| tandem.solve_tied(half, &mut || ControlFlow::Continue(())));
             if let Some(Err(stop)) = &tied {
                 rejected += 1;
                 first_rejection.get_or_insert_with(|| stop.to_string());
@@ -125,7 +127,7 @@ pub fn slide(
             }));
             Ok(())
         },
-        &|| false,
+        &mut || ControlFlow::Continue(()),
     );
     walked.map_err(interrupted)?;
     let accurate: Vec<_> = stations.iter().map(|s| s.as_ref().map(|s| s.tied.clone())).collect();
@@ -134,23 +136,23 @@ pub fn slide(
         rejected,
         first_rejection,
         step_mm: 1e3 * STEP_M,
-        accurate: roughness(judge, &accurate).ok_or(SlideError::TooShort)?,
+        accurate: roughness(evaluator, &accurate).ok_or(SlideError::TooShort)?,
         methods: Vec::new(),
     };
     for (done, method) in methods.iter().enumerate() {
         let part = format!("{} along the slide", method.name);
-        if observer(Progress { done, all: methods.len(), part: &part }).is_break() {
+        if observer(EvaluationProgress { done, all: methods.len(), part: &part }).is_break() {
             return Err(interrupted(Interrupted));
         }
-        let mut prepared = judge.prepare(method, &judge.examples(n_examples))?;
+        let mut prepared = evaluator.prepare(method, &evaluator.examples(n_examples))?;
         let mut detail = |s: &Station| prepared.evaluate(&s.displacements, 1.0, &s.touch).0.to_vec();
         let details: Vec<_> = stations.iter().map(|s| s.as_ref().map(&mut detail)).collect();
         let errors = stations.iter().flatten().zip(details.iter().flatten());
-        let errors = errors.filter_map(|(s, d)| judge.ratio(d, &s.tied));
+        let errors = errors.filter_map(|(s, d)| evaluator.ratio(d, &s.tied));
         found.methods.push(SlideMethod {
             name: method.name.clone(),
             error: Quantiles::of(errors),
-            roughness: roughness(judge, &details).ok_or(SlideError::TooShort)?,
+            roughness: roughness(evaluator, &details).ok_or(SlideError::TooShort)?,
         });
     }
     Ok(found)
@@ -178,14 +180,14 @@ fn poses(setup: &Setup) -> Result<(usize, Vec<Isometry3<f64>>), SlideError> {
 }
 
 /// `None` without three neighbours.
-fn roughness(judge: &Judge, details: &[Option<Vec<[f32; 3]>>]) -> Option<Roughness> {
+fn roughness(evaluator: &Evaluator, details: &[Option<Vec<[f32; 3]>>]) -> Option<Roughness> {
     let (mut squares, mut max, mut n) = (0.0, 0.0_f64, 0);
     for triple in details.windows(3) {
         let [Some(a), Some(b), Some(c)] = triple else { continue };
         let second = |v: usize| std::array::from_fn(|k| a[v][k] - 2.0 * b[v][k] + c[v][k]);
         let field: Vec<[f32; 3]> = (0..b.len()).map(second).collect();
-        squares += judge.rms(&field).powi(2);
-        max = max.max(judge.largest(&field));
+        squares += evaluator.rms(&field).powi(2);
+        max = max.max(evaluator.largest(&field));
         n += 1;
     }
     (n > 0).then(|| Roughness { rms_mm: 1e3 * (squares / f64::from(n)).sqrt(), max_mm: 1e3 * max })
