@@ -7,7 +7,7 @@ mod watch;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use plica_jobs::by_hand::{self, JobRequest};
+use plica_jobs::by_hand::{self, JobOptions};
 use plica_scene::Config;
 use plica_scene::setup::setup;
 use plica_training::{DatabaseKind, TrainingFolder, TrainingJob, TrainingReport, default_threads, write_atomically};
@@ -42,14 +42,14 @@ fn run_scene(config: &Config, args: &TrainArgs, n_threads: u32, json: bool) -> a
         TrainKind::Evaluation => DatabaseKind::Evaluation,
     };
     let root = args.folder.clone().unwrap_or_else(|| default_folder(config, kind));
-    let request = JobRequest { kind, examples: args.examples, seed: args.seed, threads: n_threads };
-    let (folder, job) = by_hand::make(&root, config, &request)?;
-    let begun = by_hand::begin(&root).with_context(|| root.display().to_string())?;
+    let options = JobOptions { kind, examples: args.examples, seed: args.seed, threads: n_threads };
+    let (folder, job) = by_hand::make(&root, config, &options)?;
+    let started = by_hand::begin(&root).with_context(|| root.display().to_string())?;
     let watch = OnTerminal::new(Some(ending));
     let result = work(config, &job, &folder, n_threads as usize, &mut |p| watch.observe(&p));
     watch.finish();
     // The result counts, even if the note about it cannot be written.
-    if let Err(error) = by_hand::end(&root, begun, &result) {
+    if let Err(error) = by_hand::end(&root, started, &result) {
         tracing::warn!("{}: {error}", root.display());
     }
     let report = result?;

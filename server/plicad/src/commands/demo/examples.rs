@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use plica_jobs::by_hand::{JobRequest, make};
+use plica_jobs::by_hand::{JobOptions, make};
 use plica_scene::Config;
 use plica_scene::hash::scene_hash;
 use plica_training::{Database, DatabaseKind, JobPaths};
@@ -22,7 +22,7 @@ pub(super) fn examples(config: &Config, out: &Path, n: u32) -> anyhow::Result<Tr
     }
     let n_threads = std::thread::available_parallelism().map_or(1, usize::from);
     let request =
-        JobRequest { kind: DatabaseKind::Training, examples: Some(n), seed: None, threads: u32::try_from(n_threads)? };
+        JobOptions { kind: DatabaseKind::Training, examples: Some(n), seed: None, threads: u32::try_from(n_threads)? };
     let (folder, job) = make(&root, config, &request)?;
     eprintln!("trains {n} examples in {}, once", root.display());
     let watch = OnTerminal::new(None);
