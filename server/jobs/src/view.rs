@@ -1,6 +1,6 @@
 //! Jobs as clients see them.
 
-use plica_protocol::jobs::{Job, JobKind, Progress};
+use plica_protocol::jobs::{Job, JobKind, JobProgress};
 use plica_training::TrainingStage;
 
 use crate::folder::StoredStatus;
@@ -39,12 +39,12 @@ pub(crate) fn job(
     }
 }
 
-fn job_progress(progress: plica_training::TrainingProgress) -> Progress {
+fn job_progress(progress: plica_training::TrainingProgress) -> JobProgress {
     let plica_training::TrainingProgress { stage, done, rejected, total, seconds_left } = progress;
     let stage = match stage {
         TrainingStage::Interactions => "interactions",
         TrainingStage::Examples => "examples",
         TrainingStage::Database => "database",
     };
-    Progress { stage: Some(stage.to_owned()), done, rejected, total, seconds_left }
+    JobProgress { stage: Some(stage.to_owned()), done, rejected, total, seconds_left }
 }

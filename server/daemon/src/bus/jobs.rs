@@ -7,7 +7,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use plica_protocol::chunk::offset_of;
-use plica_protocol::jobs::{JobFetchRequest, JobProgress, JobRequest, MAX_REQUEST_BYTES};
+use plica_protocol::jobs::{JobFetchRequest, JobProgressMessage, JobRequest, MAX_REQUEST_BYTES};
 use plica_protocol::rpc::{EmptyRequest, ErrorCode, ErrorReply, Method, decode_request};
 use plica_protocol::{ENCODING_BYTES, ENCODING_JSON};
 use zenoh::Wait;
@@ -72,7 +72,7 @@ impl Worker {
     fn publish(&mut self) {
         let (version, changed) = self.shared.jobs.changed_since(self.published);
         self.published = version;
-        for progress in changed.iter().map(JobProgress::from) {
+        for progress in changed.iter().map(JobProgressMessage::from) {
             let Ok(message) = json(&progress) else { continue };
             // Dropped where it does not fit into the queue at once; an error means that the session is closing.
             let _ = self.publisher.put(message).wait();
