@@ -13,10 +13,10 @@ pub struct HouseWord {
 /// Words that mean nothing else in this code.
 pub const HOUSE_WORDS: [HouseWord; 6] = [
     HouseWord { word: "likeness", term: "similarity", n_left: 2 },
-    HouseWord { word: "firm", term: "sensitivity", n_left: 2 },
+    HouseWord { word: "firm", term: "sensitivity", n_left: 0 },
     HouseWord { word: "verdict", term: "evaluation", n_left: 0 },
     HouseWord { word: "taught", term: "trained on", n_left: 0 },
-    HouseWord { word: "way to enrich", term: "enrichment method", n_left: 8 },
+    HouseWord { word: "way to enrich", term: "enrichment method", n_left: 4 },
     HouseWord { word: "ways to enrich", term: "enrichment methods", n_left: 2 },
 ];
 

@@ -29,11 +29,11 @@ pub struct Example {
     pub tied_force: [f64; 3],
     /// Force on the tool \[N\]: accurate, its own contact; evaluation only.
     pub independent_force: Option<[f64; 3]>,
-    /// What the metadata says about it.
+    /// Its record in the metadata.
     pub record: Record,
 }
 
-/// What a database's metadata says about an example.
+/// Record of an example in the metadata of a database.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
@@ -124,12 +124,12 @@ pub enum Reason {
     NotFinite,
 }
 
-/// What became of an interaction.
+/// Outcome of an interaction.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
-    /// It is stored.
+    /// Solved: an example that is stored.
     Accepted(Box<Example>),
-    /// It is listed.
+    /// Rejected: listed with the reason.
     Rejected(Rejection),
 }
 

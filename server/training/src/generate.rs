@@ -1,4 +1,4 @@
-//! The job itself: plan, solve in parallel, assemble.
+//! Runs a job: plans, solves in parallel, assembles the database.
 
 use std::ops::ControlFlow;
 use std::sync::Mutex;
@@ -33,7 +33,7 @@ pub fn run(
     observer: Observer<'_>,
 ) -> Result<TrainingReport, TrainingError> {
     let begin = Instant::now();
-    let (sets, seed) = ask(setup, job);
+    let (sets, seed) = sets_and_seed(setup, job);
     let about = About::new(&setup.scene_hash, job.kind, seed);
     let total = sets.iter().map(|set| set.count as u32).sum();
     let mut tally = Tally::new(folder, observer, total, n_threads);
@@ -74,7 +74,7 @@ pub fn run(
 }
 
 /// Sets and seed: the scene's, unless the job says otherwise.
-fn ask(setup: &Setup, job: &TrainingJob) -> (Vec<InteractionSet>, u64) {
+fn sets_and_seed(setup: &Setup, job: &TrainingJob) -> (Vec<InteractionSet>, u64) {
     let (mut sets, seed) = match job.kind {
         DatabaseKind::Training => (vec![setup.training.clone()], setup.training_seed),
         DatabaseKind::Evaluation => (setup.evaluation.clone(), setup.evaluation_seed),
@@ -85,7 +85,7 @@ fn ask(setup: &Setup, job: &TrainingJob) -> (Vec<InteractionSet>, u64) {
     (sets, job.seed.unwrap_or(seed))
 }
 
-/// What is to be solved.
+/// Interactions to solve.
 struct Work<'a> {
     setup: &'a Setup,
     interactions: &'a [Interaction],
@@ -150,7 +150,7 @@ fn first_message(database: &Database) -> String {
     database.rejected.first().map_or_else(String::new, |r| r.message.clone())
 }
 
-/// Counts what is finished, times it, and reports it to the folder and the observer.
+/// Counts and times finished interactions, and reports progress to the folder and the observer.
 struct Tally<'a> {
     folder: &'a TrainingFolder,
     total: u32,

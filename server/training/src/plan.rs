@@ -11,7 +11,7 @@ use crate::recorded;
 use crate::setup::{Approach, FeatureScales, InteractionSet, PressRanges, Setup, Source};
 use plica_geometry::{ReferenceSkin, SurfacePoint};
 
-/// Points that are tried before a region counts as one that the skin does not meet.
+/// Points drawn before a region counts as free of skin.
 const MAX_TRIES: usize = 10_000;
 /// Skin whose normal is turned this far against the approach faces the tool (cosine).
 const FACING: f64 = 0.2;
@@ -54,7 +54,7 @@ fn draw_set(
     Ok(chosen.into_iter().map(|i| candidates[i].clone()).collect())
 }
 
-/// What makes two interactions alike: `(c / 12 mm, press / 4 mm, drag / 4 mm)` with the default scales.
+/// Features that measure the similarity of interactions: `(c / 12 mm, press / 4 mm, drag / 4 mm)` with the default scales.
 fn features(interaction: &Interaction, scales: &FeatureScales) -> Vec<f64> {
     let (press, drag) = match &interaction.action {
         Action::Press { approach, depth_m, drag_m, .. } => {

@@ -1,4 +1,4 @@
-//! What a job did: `report.json`. What another machine would find as well stands apart from how long it took here.
+//! Report of a job, `report.json`: results that are the same on every machine, and times of this run.
 
 use std::collections::BTreeMap;
 
@@ -11,22 +11,22 @@ use crate::example::{Example, Record, Rejection};
 use crate::setup::Setup;
 use plica_geometry::ReferenceSkin;
 
-/// What a job did.
+/// Report of a job.
 #[derive(Debug, Clone, Serialize)]
 pub struct TrainingReport {
     /// The scene.
     pub scene_hash: String,
-    /// What the examples are for.
+    /// Kind of the database.
     pub kind: DatabaseKind,
     /// Seed of the interactions.
     pub seed: u64,
-    /// The same on every machine, up to rounding.
+    /// Results, the same on every machine up to rounding.
     pub result: Summary,
-    /// Of this run on this machine.
+    /// Times of this run on this machine.
     pub run: Run,
 }
 
-/// Figures that another machine would find as well.
+/// Results, the same on every machine up to rounding.
 #[derive(Debug, Clone, Serialize)]
 pub struct Summary {
     /// Interactions asked for.
@@ -89,7 +89,7 @@ pub struct Spread {
     pub max: f64,
 }
 
-/// How long it took here.
+/// Times of a run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Run {
     /// Threads.

@@ -24,7 +24,7 @@ use plica_geometry::ReferenceSkin;
 /// Vertices with this share of the tie's stiffness or more count as the imprint.
 const HELD: f64 = 0.01;
 
-/// What is varied.
+/// Variations to compare.
 #[derive(Debug, Clone)]
 pub struct Variations {
     /// Interactions.
@@ -37,7 +37,7 @@ pub struct Variations {
     pub independent_on_all_meshes: bool,
 }
 
-/// How far skins differ.
+/// Differences of skins.
 #[derive(Debug, Clone, Serialize)]
 pub struct Sensitivity {
     /// The scene.
@@ -52,10 +52,10 @@ pub struct Sensitivity {
     pub forces: Vec<Force>,
 }
 
-/// How far one skin is from another, over the interactions.
+/// Distance of one skin from another, over the interactions.
 #[derive(Debug, Clone, Serialize)]
 pub struct Difference {
-    /// What is varied.
+    /// Variations to compare.
     pub group: String,
     /// One skin.
     pub of: String,
@@ -70,7 +70,7 @@ pub struct Difference {
 /// Forces over the interactions.
 #[derive(Debug, Clone, Serialize)]
 pub struct Force {
-    /// Of which model.
+    /// Model.
     pub of: String,
     /// Size \[N\].
     pub size_n: Spread,
@@ -146,7 +146,7 @@ type Solve<'a> =
 /// Called with the name of a variant.
 type Observer<'a> = &'a mut (dyn FnMut(&str) -> ControlFlow<()> + Send);
 
-/// What all variants share.
+/// Inputs of all variants.
 struct Bench<'a> {
     setup: &'a Setup,
     interactions: &'a [Interaction],

@@ -1,4 +1,4 @@
-//! Suction: what unilateral contact cannot do, the same for both models.
+//! Suction, which unilateral contact cannot exert; the same load for both models.
 //!
 //! A smooth traction along the outward normal `n` at the contact point acts on a disc around it, and keeps its direction:
 //! `t(r) = p (1 - (r / R)^2)^2 n` for `r < R`, `r` the distance on the skin at rest. It is lumped at skin vertices, `f_v =
@@ -52,11 +52,11 @@ impl Disc {
 pub(crate) struct Lifted {
     /// The state.
     pub state: CoarseResult,
-    /// Forces at skin vertices that hold it, `[n_skin]` \[N\].
+    /// Forces of the suction at skin vertices, `[n_skin]` \[N\].
     pub skin_forces: Vec<Vector3<f64>>,
     /// Height reached \[m\].
     pub height_m: f64,
-    /// Whether it is the height asked for.
+    /// Whether the target height was reached.
     pub reached: bool,
 }
 

@@ -19,7 +19,7 @@ use plica_geometry::{ReferenceSkin, SurfacePoint};
 /// A result with an element below this `det F` is not stored.
 pub const SMALLEST_JACOBIAN: f64 = 0.05;
 
-/// Both models of a scene, and what one thread needs to solve interactions.
+/// Both models of a scene, with the memory of one thread.
 pub struct Tandem<'a> {
     setup: &'a Setup,
     skin: ReferenceSkin,
@@ -35,27 +35,27 @@ pub struct CoarseHalf {
     pub state: CoarseResult,
     /// Contact point on the reference skin.
     pub contact: SurfacePoint,
-    /// Where the tool is.
+    /// Pose of the tool.
     pub pose: Isometry3<f64>,
     /// Skin vertices in the contact band.
     pub targets: Vec<TieTarget>,
-    /// What acts on the object.
+    /// Load on the object.
     pub load: Load,
 }
 
-/// What acts on the object.
+/// Load on the object.
 #[derive(Debug, Clone)]
 pub enum Load {
-    /// A tool after this path.
+    /// A tool at the end of its path.
     Tool(ToolPath),
     /// Forces at skin vertices, `[n_skin]` \[N\].
     Suction(Vec<nalgebra::Vector3<f64>>),
 }
 
-/// Why there is no half.
+/// Why an interaction has no result.
 #[derive(Debug)]
 pub enum Stop {
-    /// Asked to stop.
+    /// Ended by the observer.
     Interrupted,
     /// The interaction is rejected.
     Rejected(Reason, String),
@@ -274,8 +274,8 @@ impl<'a> Tandem<'a> {
         accept(result, Reason::TiedNotConverged, Reason::TiedInverted)
     }
 
-    /// The accurate model under the tool itself, or under the same suction: nothing is taken from the coarse model but the
-    /// pressure that raised it.
+    /// The accurate model under the tool itself, or under the same suction: only the pressure of the suction is taken from the
+    /// coarse model.
     ///
     /// # Errors
     /// See [`Stop`].

@@ -19,18 +19,18 @@ use crate::plan::plan;
 use crate::setup::{IN_REGION, Setup};
 use crate::tandem::{Stop, Tandem};
 
-/// How far another coarse model is from the accurate one.
+/// Error of another coarse model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OtherCoarse {
     /// RMS errors of its skin against `independent`, states drawn as training draws \[mm\].
     pub independent_mm: Quantiles,
-    /// Those states.
+    /// Number of those states.
     pub states: usize,
-    /// States where it did not come to rest, or lost the tool.
+    /// States where it did not settle, or lost the tool.
     pub failed: usize,
 }
 
-/// Why it cannot be compared.
+/// Why another coarse model cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum OtherCoarseError {
     /// Interactions, models or threads.
@@ -44,7 +44,7 @@ pub enum OtherCoarseError {
         /// Its number.
         index: u32,
     },
-    /// Skins can only be compared vertex by vertex.
+    /// The skins have different numbers of vertices.
     #[error("the other model has {found} skin vertices, the scene {expected}")]
     OtherSkin {
         /// Of the other model.
@@ -52,14 +52,14 @@ pub enum OtherCoarseError {
         /// Of the scene.
         expected: usize,
     },
-    /// There is nothing to compare with.
+    /// No held-out example can be used.
     #[error(
         "no held-out example in the trained region holds the accurate model's own contact, or the other model settled at none"
     )]
     Nothing,
 }
 
-/// One held-out interaction with the skin that should come of it.
+/// One held-out interaction with its accurate skin.
 struct Case {
     interaction: Interaction,
     /// Offsets of the accurate skin from rest, `[n_skin]` \[m\].
@@ -131,7 +131,7 @@ pub fn other_coarse(
     Ok(OtherCoarse { independent_mm, states, failed: errors.len() - states })
 }
 
-/// The held-out interactions in the trained region. A database does not hold them, but they are drawn again from its seed.
+/// The held-out interactions in the trained region, drawn again from the seed of the database, which does not hold them.
 fn cases(setup: &Setup, held_out: &Database) -> Result<Vec<Case>, OtherCoarseError> {
     let inside: Vec<&Example> = held_out.examples.iter().filter(|e| e.record.kind == IN_REGION).collect();
     let mut set = setup.evaluation.first().ok_or(OtherCoarseError::Nothing)?.clone();

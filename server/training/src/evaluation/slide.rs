@@ -23,9 +23,9 @@ use crate::tandem::Tandem;
 use crate::tool_path::ToolPath;
 use plica_geometry::ReferenceSkin;
 
-/// From state to state \[m\].
+/// Distance between states \[m\].
 const STEP_M: f64 = 0.9e-3;
-/// Presses among which the two that lie farthest apart are begin and end.
+/// Number of presses drawn; the two farthest apart are the ends of the slide.
 const CANDIDATES: usize = 64;
 
 /// Detail along a slide.
@@ -35,13 +35,13 @@ pub struct Slide {
     pub states: usize,
     /// States with contact whose accurate solution was rejected.
     pub rejected: usize,
-    /// Why the first of them was.
+    /// Reason of the first rejection.
     pub first_rejection: Option<String>,
-    /// From state to state \[mm\].
+    /// Distance between states \[mm\].
     pub step_mm: f64,
-    /// Of the accurate solution, `tied`.
+    /// Second differences of the accurate solution, `tied`.
     pub accurate: Roughness,
-    /// Of each method.
+    /// Results of each method.
     pub methods: Vec<SlideMethod>,
 }
 
@@ -77,12 +77,12 @@ pub enum SlideError {
     /// Recorded interactions have no region to slide through.
     #[error("a slide is drawn where training draws presses; this scene trains on recorded poses")]
     NotDrawn,
-    /// The tool touches nothing, or no accurate solution is accepted.
+    /// Too few states with contact and an accepted accurate solution.
     #[error("along the slide there are not three neighbouring states with contact and an accurate solution")]
     TooShort,
 }
 
-/// A state on the way.
+/// A state along the slide.
 struct Station {
     displacements: Vec<[f32; 3]>,
     touch: Touch,
@@ -169,9 +169,9 @@ fn poses(setup: &Setup) -> Result<(usize, Vec<Isometry3<f64>>), SlideError> {
     let presses = plan(setup, &[set], setup.evaluation_seed).map_err(TrainingError::from)?;
     let skin = ReferenceSkin::new(&setup.coarse.skin);
     let shape = obstacle(&setup.coarse.tools[tool].shape).map_err(|_| SlideError::TooShort)?;
-    let ways: Vec<ToolPath> = presses.iter().filter_map(|press| ToolPath::of(press, &shape, &skin)).collect();
+    let paths: Vec<ToolPath> = presses.iter().filter_map(|press| ToolPath::of(press, &shape, &skin)).collect();
     let apart = |(a, b): &(&ToolPath, &ToolPath)| (a.end().translation.vector - b.end().translation.vector).norm();
-    let pairs = ways.iter().flat_map(|a| ways.iter().map(move |b| (a, b)));
+    let pairs = paths.iter().flat_map(|a| paths.iter().map(move |b| (a, b)));
     let farthest = pairs.max_by(|a, b| apart(a).total_cmp(&apart(b)));
     let (first, last) = farthest.ok_or(SlideError::TooShort)?;
     let back = last.poses().iter().rev();

@@ -36,7 +36,7 @@ pub(super) fn examples(config: &Config, out: &Path, n: u32) -> anyhow::Result<Tr
     })
 }
 
-/// Another scene, or another number, is another folder: nothing in it is ever out of date.
+/// Folder by scene hash and number of examples, so that its content is never out of date.
 fn folder(out: &Path, hash: &str, n: u32) -> PathBuf {
     out.join("demo-training").join(format!("{}-{n}", hash.get(..12).unwrap_or(hash)))
 }

@@ -1,4 +1,4 @@
-//! What an evaluation found, for people.
+//! Tables of an evaluation, for people.
 
 use plica_training::evaluation::{Evaluation, Group, MethodEvaluation, MethodReport, Quantiles, Roughness, Slide};
 
