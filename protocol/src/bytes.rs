@@ -1,13 +1,14 @@
-//! Little-endian fields at fixed offsets, written and read in layout order.
+//! Little-endian fields at fixed offsets, written and read in the order of the layout.
 
-use crate::{DecodeError, VERSION};
+use crate::VERSION;
+use crate::error::DecodeError;
 
-/// Reads fields one after the other. The length is checked once, by [`open`], so reads are infallible after it.
+/// Reads fields in order. [`open`] checks the length once; reads after it are infallible.
 pub(crate) struct Fields<'a> {
     rest: &'a [u8],
 }
 
-/// Checks magic, version and the `u16` length field (`header_bytes`), and stands behind them at offset 8.
+/// Checks magic, version and the `u16` length field (`header_bytes`), and moves to offset 8 behind them.
 ///
 /// Errors in this order: too short, magic, version, length.
 pub(crate) fn open<'a>(bytes: &'a [u8], magic: [u8; 4], header_bytes: usize) -> Result<Fields<'a>, DecodeError> {
@@ -30,7 +31,7 @@ pub(crate) fn open<'a>(bytes: &'a [u8], magic: [u8; 4], header_bytes: usize) -> 
     Ok(fields)
 }
 
-/// Like [`open`], for a message that is nothing but its header.
+/// [`open`] for a message without a body.
 pub(crate) fn open_exact<'a>(bytes: &'a [u8], magic: [u8; 4], n_bytes: usize) -> Result<Fields<'a>, DecodeError> {
     let fields = open(bytes, magic, n_bytes)?;
     if bytes.len() != n_bytes {
@@ -69,14 +70,14 @@ impl Fields<'_> {
     }
 }
 
-/// Writes fields one after the other into a message whose length is known.
+/// Writes fields in order into a message of known length.
 pub(crate) struct Layout<const BYTES: usize> {
     bytes: [u8; BYTES],
     at: usize,
 }
 
 impl<const BYTES: usize> Layout<BYTES> {
-    /// Magic, version and length are written.
+    /// Starts a message with magic, version and length.
     pub(crate) fn new(magic: [u8; 4]) -> Self {
         let mut layout = Self { bytes: [0; BYTES], at: 0 };
         layout.put(magic).put(VERSION.to_le_bytes()).put((BYTES as u16).to_le_bytes());
@@ -112,7 +113,7 @@ impl<const BYTES: usize> Layout<BYTES> {
         self
     }
 
-    /// The message; every byte has been written by then.
+    /// The finished message.
     pub(crate) fn finish(&self) -> [u8; BYTES] {
         debug_assert_eq!(self.at, BYTES, "layout not filled");
         self.bytes

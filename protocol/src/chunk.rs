@@ -1,47 +1,47 @@
-//! Replies too large for one message: `?offset=N` asks for the piece that starts at byte N.
+//! Replies in chunks: `?offset=N` requests the chunk that starts at byte N.
 //!
-//! Each piece carries a [`ChunkHeader`] as JSON in the reply's attachment. A reader asks from offset 0 on until it has
-//! `total_bytes`, starts again if `sha256` changes on the way, and checks the SHA-256 of the whole at the end.
+//! Each chunk carries a [`ChunkHeader`] as JSON in the reply's attachment. A reader requests from offset 0 on until it has
+//! `total_bytes`, starts again if `sha256` changes meanwhile, and checks the SHA-256 of the whole at the end.
 
 use serde::{Deserialize, Serialize};
 
 use crate::rpc::{ErrorCode, ErrorReply};
 
-/// Largest piece in bytes (512 KiB).
+/// Largest chunk in bytes (512 KiB).
 pub const CHUNK_BYTES: usize = 512 * 1024;
 
-/// Says which piece of what this is. Travels as the reply's attachment.
+/// Position of a chunk in the whole; attachment of the reply.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ChunkHeader {
     /// Length of the whole in bytes.
     pub total_bytes: u64,
-    /// Where this piece starts.
+    /// First byte of this chunk.
     pub offset: u64,
     /// SHA-256 of the whole, 64 lower-case hexadecimal digits.
     pub sha256: String,
 }
 
 impl ChunkHeader {
-    /// The attachment.
+    /// Encodes the attachment.
     pub fn to_json(&self) -> String {
         serde_json::to_string(self).expect("numbers and hexadecimal digits always serialise")
     }
 
-    /// Reads an attachment.
-    pub fn from_json(bytes: &[u8]) -> Result<Self, crate::DecodeError> {
-        serde_json::from_slice(bytes).map_err(|error| crate::DecodeError::Json(error.to_string()))
+    /// Decodes an attachment.
+    pub fn from_json(bytes: &[u8]) -> Result<Self, crate::error::DecodeError> {
+        serde_json::from_slice(bytes).map_err(|error| crate::error::DecodeError::Json(error.to_string()))
     }
 }
 
-/// The offset that a selector's parameters (`offset=524288`, parted by `;`) ask for; 0 without one.
+/// Offset in a selector's parameters (`offset=524288`, separated by `;`); 0 without one.
 ///
-/// Other parameters are ignored. Errors with `bad_offset` if it is no number.
+/// Other parameters are ignored. Errors with `bad_offset` if it is not a number.
 pub fn offset_of(parameters: &str) -> Result<u64, ErrorReply> {
     let value = parameters.split(';').find_map(|pair| pair.strip_prefix("offset="));
     value.map_or(Ok(0), |text| text.parse().map_err(|_| bad_offset(text, "a whole number of bytes is expected")))
 }
 
-/// The piece of `whole` from `offset` on. The end itself gives an empty piece; beyond it errors with `bad_offset`.
+/// Chunk of `whole` from `offset` on; empty at the end. Errors with `bad_offset` beyond the end.
 pub fn piece(whole: &[u8], offset: u64) -> Result<&[u8], ErrorReply> {
     check_offset(offset, whole.len() as u64)?;
     let start = offset as usize;

@@ -2,18 +2,18 @@
 
 use thiserror::Error;
 
-/// A refused message. [`DecodeError::kind`] is the name under which the daemon's status counts it.
+/// A refused message. [`DecodeError::kind`] is its counter in the daemon's status.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum DecodeError {
     /// Fewer bytes than the message needs.
     #[error("message too short: {got} bytes, {needed} needed")]
     TooShort {
-        /// Bytes that the message needs, as far as they are known.
+        /// Bytes needed, as far as known.
         needed: u64,
         /// Bytes that arrived.
         got: u64,
     },
-    /// The first four bytes are those of another message.
+    /// The first four bytes belong to another message.
     #[error("wrong magic bytes {found:?}, expected {expected:?}")]
     Magic {
         /// The bytes that arrived.
@@ -29,10 +29,10 @@ pub enum DecodeError {
         /// The version of this build.
         expected: u16,
     },
-    /// The length field, or the length of the whole message, contradicts the layout.
+    /// The length field or the length of the message contradicts the layout.
     #[error("wrong length: {got} bytes, expected {expected}")]
     Length {
-        /// Bytes that the layout has.
+        /// Bytes of the layout.
         expected: u64,
         /// Bytes that arrived or were declared.
         got: u64,
@@ -43,13 +43,13 @@ pub enum DecodeError {
         /// Name of the field.
         field: &'static str,
     },
-    /// An orientation whose length is further than 1e-2 from 1.
+    /// An orientation with a length more than 1e-2 from 1.
     #[error("orientation has length {norm}, expected 1 within 0.01")]
     NotUnit {
         /// Length of the quaternion that arrived.
         norm: f64,
     },
-    /// A finite value that no honest sender has.
+    /// A finite value above the limit.
     #[error("`{field}` is {value}, at most {limit} is accepted")]
     OutOfRange {
         /// Name of the field.
@@ -65,11 +65,11 @@ pub enum DecodeError {
 }
 
 impl DecodeError {
-    /// All names that [`DecodeError::kind`] can return.
+    /// All values of [`DecodeError::kind`].
     pub const KINDS: [&'static str; 8] =
         ["too_short", "bad_magic", "bad_version", "bad_length", "non_finite", "not_unit", "out_of_range", "bad_json"];
 
-    /// The counter of the status message that this error belongs to.
+    /// Name of the counter in the status.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::TooShort { .. } => "too_short",

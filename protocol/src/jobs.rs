@@ -1,15 +1,15 @@
-//! Jobs: long-running work that a daemon queues, supervises and keeps on disk.
+//! Jobs: long-running work that a daemon queues, supervises and stores on disk.
 //!
 //! `queued -> running -> (done | failed | cancelled)`, and `paused` while no daemon runs. Requests are JSON under
-//! `rpc/job_...`; progress is JSON on the key `job_progress`. These types say what may stand in a request; whether a
-//! scene is good and a job exists is the daemon's to say.
+//! `rpc/job_...`; progress is JSON on the key `job_progress`. These types check the form of a request; the daemon
+//! checks scenes and ids.
 
 use serde::{Deserialize, Serialize};
 
 use crate::keys::check_name;
 use crate::rpc::{ErrorCode, ErrorReply};
 
-/// Most bytes of a job request, the scene included (1 MiB).
+/// Largest job request in bytes, with its scene (1 MiB).
 pub const MAX_REQUEST_BYTES: usize = 1 << 20;
 /// Most examples of one job.
 pub const MAX_EXAMPLES: u32 = 100_000;
@@ -20,31 +20,31 @@ pub const MAX_LISTED: usize = 256;
 /// Jobs that the status names: the newest ones.
 pub const MAX_IN_STATUS: usize = 16;
 
-/// What a job makes.
+/// Kind of the database that a job makes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum JobKind {
-    /// Examples to learn from.
+    /// Examples to train on.
     Training,
-    /// Held-out interactions, drawn in the same way, that are never trained on.
+    /// Held-out interactions, drawn in the same way and never trained on.
     Evaluation,
 }
 
-/// Where a job stands.
+/// State of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum JobState {
-    /// Waits for its turn: one job runs at a time.
+    /// Waits in the queue; one job runs at a time.
     Queued,
-    /// Its process is at work.
+    /// Its process runs.
     Running,
-    /// The daemon was stopped while it ran; it goes on when the daemon starts again.
+    /// Its daemon was stopped while it ran; the next daemon continues it.
     Paused,
     /// The result can be fetched.
     Done,
-    /// It ended without a result; `reason` says why. `job_resume` keeps what is finished.
+    /// Ended without a result, for `reason`. `job_resume` keeps finished examples.
     Failed,
-    /// Somebody ended it. `job_resume` keeps what is finished.
+    /// Cancelled by a client. `job_resume` keeps finished examples.
     Cancelled,
 }
 
@@ -52,7 +52,7 @@ impl JobState {
     /// All states.
     pub const ALL: [Self; 6] = [Self::Queued, Self::Running, Self::Paused, Self::Done, Self::Failed, Self::Cancelled];
 
-    /// The state as it stands in JSON.
+    /// Name of the state in JSON.
     pub fn name(self) -> &'static str {
         match self {
             Self::Queued => "queued",
@@ -64,7 +64,7 @@ impl JobState {
         }
     }
 
-    /// True if the job changes no more by itself.
+    /// Whether the job has ended: done, failed or cancelled.
     pub fn is_over(self) -> bool {
         matches!(self, Self::Done | Self::Failed | Self::Cancelled)
     }
@@ -74,14 +74,14 @@ impl JobState {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JobSubmitRequest {
-    /// Chosen by the client: submitting twice with the same one is one job. A name as in keys.
+    /// Name chosen by the client, as in keys; two submissions with the same id are one job.
     pub client_id: String,
-    /// What to make.
+    /// Kind of the database.
     pub kind: JobKind,
-    /// How many examples, 1 to [`MAX_EXAMPLES`]; left out: what the scene says.
+    /// Number of examples, 1 to [`MAX_EXAMPLES`]; left out: the scene's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub examples: Option<u32>,
-    /// Seed of the interactions; left out: what the scene says.
+    /// Seed of the interactions; left out: the scene's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
     /// Threads, 1 to [`MAX_THREADS`]; left out: all cores of the daemon's machine but one.
@@ -90,13 +90,13 @@ pub struct JobSubmitRequest {
     /// Text of a scene file (TOML); left out: the scene that the daemon serves.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene: Option<String>,
-    /// Name of that scene, for people; only beside `scene`.
+    /// Name of `scene`, for people; only together with it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene_name: Option<String>,
 }
 
 impl JobSubmitRequest {
-    /// A request that leaves everything to the daemon.
+    /// Request with defaults for everything else.
     pub fn new(client_id: impl Into<String>, kind: JobKind) -> Self {
         let client_id = client_id.into();
         Self { client_id, kind, examples: None, seed: None, threads: None, scene: None, scene_name: None }
@@ -109,7 +109,7 @@ impl JobSubmitRequest {
         in_range("threads", self.threads, MAX_THREADS)?;
         let Some(name) = &self.scene_name else { return Ok(()) };
         if self.scene.is_none() {
-            return Err(malformed("scene_name without scene; it names the scene that is sent".to_owned()));
+            return Err(malformed("scene_name without scene; it names the scene in the request".to_owned()));
         }
         check_name(name).map_err(|e| malformed(format!("scene_name: {e}")))
     }
@@ -132,11 +132,11 @@ fn malformed(message: String) -> ErrorReply {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JobRequest {
-    /// What `job_submit` returned.
+    /// Id that `job_submit` returned.
     pub id: String,
 }
 
-/// A file that a job leaves.
+/// Result file of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum JobFile {
@@ -146,60 +146,60 @@ pub enum JobFile {
     Report,
 }
 
-/// Request of `job_fetch`, which is answered in pieces (see [`crate::chunk`]).
+/// Request of `job_fetch`; the reply comes in chunks (see [`crate::chunk`]).
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JobFetchRequest {
-    /// What `job_submit` returned.
+    /// Id that `job_submit` returned.
     pub id: String,
-    /// Which file.
+    /// Requested file.
     #[serde(rename = "what")]
     pub file: JobFile,
 }
 
-/// All about one job. Reply of `job_get`, `job_cancel` and `job_resume`.
+/// A job with its status and progress. Reply of `job_get`, `job_cancel` and `job_resume`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Job {
-    /// Given by the daemon; ids of later jobs come later in the alphabet.
+    /// Id from the daemon; ids sort in the order of submission.
     pub id: String,
-    /// Given by the client.
+    /// Id from the client.
     pub client_id: String,
-    /// What it makes.
+    /// Kind of the database.
     pub kind: JobKind,
     /// Name of the scene.
     pub scene_name: String,
-    /// Examples asked for; null: what the scene says.
+    /// Requested number of examples; null: the scene's.
     pub examples: Option<u32>,
-    /// Seed asked for; null: what the scene says.
+    /// Requested seed; null: the scene's.
     pub seed: Option<u64>,
-    /// Threads.
+    /// Number of threads.
     pub threads: u32,
-    /// When it was submitted, in seconds since 1970.
+    /// Time of submission, in seconds since 1970.
     pub submitted_unix_s: u64,
-    /// Where it stands.
+    /// State.
     pub state: JobState,
-    /// Why it is where it is, in words, if there is anything to say.
+    /// Reason of the state as a sentence, if there is one.
     pub reason: Option<String>,
-    /// When its process was last started, in seconds since 1970.
+    /// Last start of its process, in seconds since 1970.
     pub started_unix_s: Option<u64>,
-    /// When it ended, in seconds since 1970.
+    /// End, in seconds since 1970.
     pub finished_unix_s: Option<u64>,
-    /// How far it is.
+    /// Progress.
     #[serde(flatten)]
-    pub progress: Progress,
+    pub progress: JobProgress,
 }
 
-/// How far a job is.
+/// Progress of a job.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Progress {
-    /// What it does at the moment: `interactions`, `examples`, `database`, perhaps others later; null before the start.
+pub struct JobProgress {
+    /// Present stage: `interactions`, `examples`, `database`, in later versions perhaps others; null before the start.
     pub stage: Option<String>,
-    /// Examples that are on disk.
+    /// Finished examples, all of them on disk.
     pub done: u32,
-    /// Interactions that gave no example: they did not converge, or came out too distorted. The report lists them.
+    /// Interactions without an example, since a solve did not converge or an element is too distorted. The report lists them.
     pub rejected: u32,
-    /// Interactions in all, `done + rejected` at the end; 0 while it is not known.
+    /// Interactions in all, `done + rejected` at the end; 0 while unknown.
     pub total: u32,
     /// Estimate of the time left in seconds.
     pub seconds_left: Option<f64>,
@@ -208,7 +208,7 @@ pub struct Progress {
 /// Reply of `job_submit`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct JobSubmitReply {
-    /// False if this client id had been submitted before: then this is that job.
+    /// False if the client id was submitted before; `job` is then the existing job.
     pub created: bool,
     /// The job.
     #[serde(flatten)]
@@ -220,33 +220,33 @@ pub struct JobSubmitReply {
 pub struct JobListReply {
     /// The newest [`MAX_LISTED`], oldest first.
     pub jobs: Vec<Job>,
-    /// How many older ones there are; `job_get` knows them by id.
+    /// Number of older jobs that the list leaves out; `job_get` returns them by id.
     #[serde(default)]
     pub older: u32,
 }
 
-/// What is published on `job_progress` when something has changed.
+/// Message on `job_progress`, published when a job has changed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct JobProgress {
-    /// Which job.
+pub struct JobProgressMessage {
+    /// Id of the job.
     pub id: String,
-    /// Where it stands.
+    /// State.
     pub state: JobState,
-    /// Why, if there is anything to say.
+    /// Reason of the state as a sentence, if there is one.
     pub reason: Option<String>,
-    /// How far it is.
+    /// Progress.
     #[serde(flatten)]
-    pub progress: Progress,
+    pub progress: JobProgress,
 }
 
-impl JobProgress {
-    /// Reads a message.
-    pub fn from_json(bytes: &[u8]) -> Result<Self, crate::DecodeError> {
-        serde_json::from_slice(bytes).map_err(|error| crate::DecodeError::Json(error.to_string()))
+impl JobProgressMessage {
+    /// Decodes a message.
+    pub fn from_json(bytes: &[u8]) -> Result<Self, crate::error::DecodeError> {
+        serde_json::from_slice(bytes).map_err(|error| crate::error::DecodeError::Json(error.to_string()))
     }
 }
 
-impl From<&Job> for JobProgress {
+impl From<&Job> for JobProgressMessage {
     fn from(job: &Job) -> Self {
         Self { id: job.id.clone(), state: job.state, reason: job.reason.clone(), progress: job.progress.clone() }
     }
@@ -255,21 +255,21 @@ impl From<&Job> for JobProgress {
 /// A job in the status.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct JobStatus {
-    /// Which job.
+    /// Id of the job.
     pub id: String,
-    /// Where it stands.
+    /// State.
     pub state: JobState,
-    /// See [`Progress::done`].
+    /// See [`JobProgress::done`].
     pub done: u32,
-    /// See [`Progress::rejected`].
+    /// See [`JobProgress::rejected`].
     pub rejected: u32,
-    /// See [`Progress::total`].
+    /// See [`JobProgress::total`].
     pub total: u32,
 }
 
 impl From<&Job> for JobStatus {
     fn from(job: &Job) -> Self {
-        let Progress { done, rejected, total, .. } = job.progress;
+        let JobProgress { done, rejected, total, .. } = job.progress;
         Self { id: job.id.clone(), state: job.state, done, rejected, total }
     }
 }

@@ -35,7 +35,7 @@ pub struct Keys {
 }
 
 impl Keys {
-    /// The keys under `plica/v1/<session>`.
+    /// Keys under `plica/v1/<session>`.
     pub fn new(session: &str) -> Result<Self, NameError> {
         check_name(session)?;
         Ok(Self { root: format!("{PREFIX}/{session}") })
@@ -46,17 +46,17 @@ impl Keys {
         &self.root
     }
 
-    /// Poses of a tool, in. `*` for all tools.
+    /// Poses of a tool, input. `*` for all tools.
     pub fn pose(&self, tool: &str) -> String {
         format!("{}/tool/{tool}/pose", self.root)
     }
 
-    /// Wrenches of a tool, out. `*` for all tools.
+    /// Wrenches of a tool, output. `*` for all tools.
     pub fn wrench(&self, tool: &str) -> String {
         format!("{}/tool/{tool}/wrench", self.root)
     }
 
-    /// Skin frames of an object, out, and queryable. `*` for all objects.
+    /// Skin frames of an object, output and queryable. `*` for all objects.
     pub fn skin(&self, object: &str) -> String {
         format!("{}/object/{object}/skin", self.root)
     }
@@ -66,7 +66,7 @@ impl Keys {
         format!("{}/object/{object}/mesh", self.root)
     }
 
-    /// Status, out at 2 Hz, and queryable.
+    /// Status, output at 2 Hz and queryable.
     pub fn status(&self) -> String {
         format!("{}/status", self.root)
     }
@@ -76,7 +76,7 @@ impl Keys {
         format!("{}/rpc/{method}", self.root)
     }
 
-    /// Progress of jobs, out.
+    /// Progress of jobs, output.
     pub fn job_progress(&self) -> String {
         format!("{}/job_progress", self.root)
     }

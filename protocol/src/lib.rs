@@ -1,8 +1,8 @@
-//! The wire of Plica and nothing else: binary messages, keys, JSON types.
+//! Wire format of Plica: binary messages, keys, JSON types.
 //!
-//! `PROTOCOL.md` beside this crate is the same text for other languages. This crate knows bytes, and the rule of whose
-//! poses count ([`order`]); it knows neither Zenoh nor simulation types. Decoding never panics, whatever the bytes, and
-//! never allocates for binary messages.
+//! `PROTOCOL.md` beside this crate describes the same format for other languages. This crate holds bytes and the rule by which
+//! poses are accepted ([`order`]); it knows neither Zenoh nor simulation types. Decoding never panics on any bytes, and never
+//! allocates for binary messages.
 //!
 //! All binary messages are little-endian and start with four magic bytes, `u16 version` and a `u16` length: of the
 //! whole message for poses and wrenches, of the header for skin frames.
@@ -24,17 +24,17 @@ pub use error::DecodeError;
 /// Version of every binary message, and the `v1` of every key.
 pub const VERSION: u16 = 1;
 
-/// Encoding of JSON payloads; a pose whose encoding says this is read as JSON.
+/// Encoding of JSON payloads; a pose with this encoding is decoded as JSON.
 pub const ENCODING_JSON: &str = "application/json";
 
-/// Encoding of binary payloads (also what a sender that names no encoding gets).
+/// Encoding of binary payloads, and of payloads without a named encoding.
 pub const ENCODING_BYTES: &str = "zenoh/bytes";
 
 /// Encoding of the mesh reply.
 pub const ENCODING_GLB: &str = "model/gltf-binary";
 
-/// Where a daemon listens and a client connects when nobody says otherwise.
+/// Default endpoint of daemon and client.
 pub const DEFAULT_ENDPOINT: &str = "tcp/127.0.0.1:7447";
 
-/// The session name when nobody says otherwise.
+/// Default session name.
 pub const DEFAULT_SESSION: &str = "main";

@@ -1,28 +1,28 @@
-//! Which poses of a tool count: order within a source, and who may take over.
+//! Acceptance of poses of a tool: order within a source, and take-over by another source.
 //!
-//! One [`SourceOrder`] per tool. Time is given by the caller, so that the rule is the same under a real clock and in
+//! One [`SourceOrder`] per tool. The caller passes the time, so that the rule is the same under a real clock and in
 //! lock-step.
 
 use crate::pose::Pose;
 
-/// Why a well-formed pose is not used. [`Refusal::kind`] is the name under which the status counts it.
+/// Why a well-formed pose is refused. [`Refusal::kind`] is its counter in the status.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Refusal {
-    /// The tracker says that it does not see the tool.
+    /// The pose is flagged as invalid: the tracker does not see the tool.
     Invalid,
-    /// The sequence of this source was there before.
+    /// The source has sent this sequence before.
     Repeated,
-    /// A later sequence of this source was there before.
+    /// The source has sent a later sequence before.
     OutOfOrder,
     /// Another source holds the tool and is not stale.
     Conflict,
 }
 
 impl Refusal {
-    /// All of them.
+    /// All refusals.
     pub const ALL: [Self; 4] = [Self::Invalid, Self::Repeated, Self::OutOfOrder, Self::Conflict];
 
-    /// The counter of the status message.
+    /// Name of the counter in the status.
     pub fn kind(self) -> &'static str {
         match self {
             Self::Invalid => "invalid",
@@ -33,7 +33,7 @@ impl Refusal {
     }
 }
 
-/// Who holds a tool, and how far it has come.
+/// Source that holds a tool, and its last sequence.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SourceOrder {
     holder: Option<Holder>,
@@ -47,10 +47,10 @@ struct Holder {
 }
 
 impl SourceOrder {
-    /// Takes a pose that arrives at `now_s`, or says why not; a refused pose changes nothing.
+    /// Accepts or refuses a pose that arrives at `now_s`; a refused pose changes nothing.
     ///
-    /// The holder is stale once its last pose was taken more than `stale_after_s` ago. Then the next valid pose is
-    /// taken, whatever its source and sequence. A pose with sequence 0 is unnumbered: it is judged by source only.
+    /// The holder is stale once its last accepted pose is older than `stale_after_s`. Then the next valid pose of any source is
+    /// accepted, with any sequence. A pose with sequence 0 is unnumbered: only its source is compared.
     pub fn take(&mut self, pose: &Pose, now_s: f64, stale_after_s: f64) -> Result<(), Refusal> {
         if !pose.valid {
             return Err(Refusal::Invalid);
@@ -58,7 +58,7 @@ impl SourceOrder {
         let fresh = self.holder.filter(|holder| now_s - holder.taken_at_s <= stale_after_s);
         match fresh {
             Some(holder) if holder.source_id != pose.source_id => return Err(Refusal::Conflict),
-            Some(holder) => holder.judge(pose.sequence)?,
+            Some(holder) => holder.check(pose.sequence)?,
             None => {}
         }
         let Pose { source_id, sequence, .. } = *pose;
@@ -68,14 +68,14 @@ impl SourceOrder {
         Ok(())
     }
 
-    /// Forgets the holder: the next valid pose of anyone is taken (`rpc/reset`).
+    /// Forgets the holder: the next valid pose of any source is accepted (`rpc/reset`).
     pub fn forget(&mut self) {
         self.holder = None;
     }
 }
 
 impl Holder {
-    fn judge(&self, sequence: u64) -> Result<(), Refusal> {
+    fn check(&self, sequence: u64) -> Result<(), Refusal> {
         match sequence {
             0 => Ok(()),
             same if same == self.sequence => Err(Refusal::Repeated),

@@ -1,12 +1,12 @@
-//! Device poses, on their way in: `PLPS`, 96 bytes, or the same as JSON.
+//! Device poses, input: `PLPS`, 96 bytes, or the same as JSON.
 //!
 //! Both forms pass the same gate ([`Pose::checked`]): finite numbers, a position within [`MAX_POSITION_M`], an
 //! orientation of unit length within [`UNIT_TOLERANCE`], which is then normalised.
 
 use serde::{Deserialize, Serialize};
 
-use crate::DecodeError;
 use crate::bytes::{Layout, finite, open_exact};
+use crate::error::DecodeError;
 use crate::keys::check_name;
 
 /// First bytes of a pose.
@@ -15,19 +15,19 @@ pub const MAGIC: [u8; 4] = *b"PLPS";
 pub const BYTES: usize = 96;
 /// Largest accepted distance from the origin in metres.
 pub const MAX_POSITION_M: f64 = 1e3;
-/// How far the length of an orientation may be from 1.
+/// Tolerance of an orientation's length around 1.
 pub const UNIT_TOLERANCE: f64 = 1e-2;
 
 const FLAG_VALID: u32 = 1;
 
-/// Where a tracker says that a tool is.
+/// Pose of a tool as its tracker measures it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     /// Rises by one or more with each pose of a source; 0 means that the source does not number its poses.
     pub sequence: u64,
-    /// When the pose was measured, on the source's own clock, in nanoseconds; 0 means unknown.
+    /// Time of the measurement on the source's own clock, in nanoseconds; 0 means unknown.
     pub source_time_ns: u64,
-    /// Drawn at random when a publisher starts; order is judged within one source.
+    /// Random number of a started publisher; sequences are compared within one source.
     pub source_id: u32,
     /// False while the tracker does not see the tool.
     pub valid: bool,
@@ -57,7 +57,7 @@ impl Default for Pose {
 }
 
 impl Pose {
-    /// The 96 bytes of the wire, as they are (the gate is the reader's).
+    /// Encodes 96 bytes, unchecked: the reader applies the gate.
     pub fn encode(&self) -> [u8; BYTES] {
         Layout::new(MAGIC)
             .u64(self.sequence)
@@ -71,7 +71,7 @@ impl Pose {
             .finish()
     }
 
-    /// Reads 96 bytes and passes them through the gate. Unknown flag bits are ignored.
+    /// Decodes 96 bytes and applies the gate. Unknown flag bits are ignored.
     pub fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
         let mut fields = open_exact(bytes, MAGIC, BYTES)?;
         Self {
@@ -87,23 +87,23 @@ impl Pose {
         .checked()
     }
 
-    /// Reads the JSON form and passes it through the gate.
+    /// Decodes the JSON form and applies the gate.
     pub fn decode_json(bytes: &[u8]) -> Result<Self, DecodeError> {
         let json: JsonPose = serde_json::from_slice(bytes).map_err(|error| DecodeError::Json(error.to_string()))?;
         json.to_pose()
     }
 
-    /// The JSON form, all fields written.
+    /// Encodes the JSON form with all fields.
     pub fn to_json(&self) -> String {
         serde_json::to_string(&JsonPose::from(self)).expect("numbers always serialise")
     }
 
-    /// The gate: the same pose with a normalised orientation, or why it is refused.
+    /// The gate: the pose with a normalised orientation, or the reason of its refusal.
     ///
     /// ```text
     /// q <- q / |q|   if | |q| - 1 | <= 1e-2
     /// ```
-    /// A quaternion that is already unit to rounding keeps its bits, so that the gate applied twice changes nothing.
+    /// A quaternion of unit length to rounding keeps its bits, so that a second gate changes nothing.
     pub fn checked(mut self) -> Result<Self, DecodeError> {
         finite("position", &self.position_m)?;
         finite("orientation", &self.orientation_xyzw)?;
@@ -117,10 +117,10 @@ impl Pose {
     }
 }
 
-/// The gate of [`Pose::checked`] for a pose that did not come over the bus: the normalised orientation `xyzw`.
+/// The gate of [`Pose::checked`] for a pose that did not arrive over the bus: returns the normalised orientation `xyzw`.
 ///
 /// # Errors
-/// A sentence: the tool's name cannot be part of a key, or the pose is refused.
+/// A sentence: the tool's name is not a name, or the pose is refused.
 pub fn gate(tool: Option<&str>, position_m: [f64; 3], orientation_xyzw: [f64; 4]) -> Result<[f64; 4], String> {
     tool.map_or(Ok(()), check_name).map_err(|error| error.to_string())?;
     let pose = Pose { position_m, orientation_xyzw, ..Pose::default() }.checked();
@@ -173,7 +173,7 @@ pub(crate) fn yes() -> bool {
 }
 
 impl JsonPose {
-    /// The pose, passed through the gate.
+    /// Applies the gate.
     pub fn to_pose(&self) -> Result<Pose, DecodeError> {
         Pose {
             sequence: self.sequence,

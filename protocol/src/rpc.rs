@@ -1,20 +1,20 @@
 //! Methods under `rpc/<method>`: JSON in, JSON out.
 //!
-//! An empty payload is read as `{}`. Unknown keys are errors, so that a typing mistake is not a silent default.
+//! An empty payload counts as `{}`. Unknown keys are errors, so that a misspelt key does not become a silent default.
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::DecodeError;
+use crate::error::DecodeError;
 use crate::pose::{JsonPose, Pose, yes};
 
-/// Most ticks that one `step` may ask for; they must pass within a client's time-out.
+/// Most ticks of one `step`; they must pass within a client's time-out.
 pub const MAX_STEP_TICKS: u32 = 10_000;
 
-/// What a daemon can be asked to do.
+/// Methods of a daemon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Method {
-    /// Rest state, tick 0, tools unplaced, pose order forgotten. Request `{}`, reply [`StateReply`].
+    /// Returns to the rest state and tick 0; tools are unplaced, pose order is forgotten. Request `{}`, reply [`StateReply`].
     Reset,
     /// Stops the clock of the simulation. Request `{}`, reply [`StateReply`].
     Pause,
@@ -22,23 +22,23 @@ pub enum Method {
     Resume,
     /// Runs ticks while paused. Request [`StepRequest`], reply [`StepReply`].
     Step,
-    /// Keeps the present state. Request `{}`, reply [`SnapshotReply`].
+    /// Stores the present state. Request `{}`, reply [`SnapshotReply`].
     Snapshot,
-    /// Returns to a kept state. Request [`RestoreRequest`], reply [`StateReply`].
+    /// Returns to a stored state. Request [`RestoreRequest`], reply [`StateReply`].
     Restore,
     /// Queues a job. Request [`crate::jobs::JobSubmitRequest`], reply [`crate::jobs::JobSubmitReply`].
     JobSubmit,
-    /// All jobs. Request `{}`, reply [`crate::jobs::JobListReply`].
+    /// Lists all jobs. Request `{}`, reply [`crate::jobs::JobListReply`].
     JobList,
-    /// One job. Request [`crate::jobs::JobRequest`], reply [`crate::jobs::Job`].
+    /// Returns one job. Request [`crate::jobs::JobRequest`], reply [`crate::jobs::Job`].
     JobGet,
-    /// Ends a job that waits or runs. Request [`crate::jobs::JobRequest`], reply [`crate::jobs::Job`].
+    /// Cancels a queued or running job. Request [`crate::jobs::JobRequest`], reply [`crate::jobs::Job`].
     JobCancel,
     /// Queues a failed, cancelled or paused job again. Request [`crate::jobs::JobRequest`], reply [`crate::jobs::Job`].
     JobResume,
-    /// A result, in pieces. Request [`crate::jobs::JobFetchRequest`], reply bytes with a [`crate::chunk::ChunkHeader`].
+    /// Returns a result in chunks. Request [`crate::jobs::JobFetchRequest`], reply bytes with a [`crate::chunk::ChunkHeader`].
     JobFetch,
-    /// Enriches with other examples. Request [`ActivateRequest`], reply [`ActivateReply`].
+    /// Activates other examples for enrichment. Request [`ActivateRequest`], reply [`ActivateReply`].
     Activate,
 }
 
@@ -60,7 +60,7 @@ impl Method {
         Self::Activate,
     ];
 
-    /// The last part of the key.
+    /// Last part of the key.
     pub fn name(self) -> &'static str {
         match self {
             Self::Reset => "reset",
@@ -79,12 +79,12 @@ impl Method {
         }
     }
 
-    /// True if it is about jobs and not about the simulation.
+    /// Whether the method concerns jobs, not the simulation.
     pub fn is_about_jobs(self) -> bool {
         self.name().starts_with("job_")
     }
 
-    /// The method of that name. Errors with `rpc_unknown`.
+    /// Method with a name. Errors with `rpc_unknown`.
     pub fn parse(name: &str) -> Result<Self, ErrorReply> {
         Self::ALL.into_iter().find(|method| method.name() == name).ok_or_else(|| {
             let known = Self::ALL.map(Self::name).join(", ");
@@ -93,29 +93,29 @@ impl Method {
     }
 }
 
-/// Reads a request. Errors with `rpc_malformed`.
+/// Decodes a request. Errors with `rpc_malformed`.
 pub fn decode_request<T: DeserializeOwned>(payload: &[u8]) -> Result<T, ErrorReply> {
     let payload = if payload.is_empty() { b"{}" } else { payload };
     serde_json::from_slice(payload).map_err(|error| ErrorReply::new(ErrorCode::RpcMalformed, error.to_string()))
 }
 
-/// `{}`: a method without arguments.
+/// Request of a method without arguments, `{}`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EmptyRequest {}
 
-/// Lock-step: the poses are applied first, in order, then the ticks run.
+/// Lock-step: applies the poses in order, then runs the ticks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StepRequest {
-    /// How many ticks, 0 to [`MAX_STEP_TICKS`].
+    /// Number of ticks, 0 to [`MAX_STEP_TICKS`].
     pub ticks: u32,
     /// Poses to apply before the first tick.
     #[serde(default)]
     pub poses: Vec<StepPose>,
 }
 
-/// A pose and the tool that it is for: `{"tool": name, ...}` with the keys of the JSON pose.
+/// Pose of a named tool: `{"tool": name, ...}` with the keys of the JSON pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StepPose {
@@ -153,60 +153,60 @@ impl StepPose {
         Self { tool, sequence, source_time_ns, source_id, valid, position, orientation, buttons, grip }
     }
 
-    /// The pose, passed through the gate of [`Pose::checked`].
+    /// Applies the gate of [`Pose::checked`].
     pub fn to_pose(&self) -> Result<Pose, DecodeError> {
         let Self { sequence, source_time_ns, source_id, valid, position, orientation, buttons, grip, .. } = *self;
         JsonPose { sequence, source_time_ns, source_id, valid, position, orientation, buttons, grip }.to_pose()
     }
 }
 
-/// Asks for a kept state.
+/// Request of `restore`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RestoreRequest {
-    /// What `snapshot` returned.
+    /// Id that `snapshot` returned.
     pub id: String,
 }
 
-/// Names examples to enrich with.
+/// Request of `activate`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActivateRequest {
-    /// Id of a job that is done (digits only), or path of a database on the daemon's machine.
+    /// Id of a finished job (digits only), or path of a database on the daemon's machine.
     pub database: String,
 }
 
 impl ActivateRequest {
-    /// The id, if it names a job.
+    /// Id of the job, if it names one.
     pub fn job(&self) -> Option<&str> {
         let is_id = !self.database.is_empty() && self.database.bytes().all(|b| b.is_ascii_digit());
         is_id.then_some(self.database.as_str())
     }
 }
 
-/// Which examples enrich from now on.
+/// Reply of `activate`: the examples that are active now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ActivateReply {
-    /// Frames of later ticks are made with them.
+    /// Tick of the change: frames of later ticks use them.
     pub tick: u64,
-    /// What those frames carry.
+    /// Generation in the header of those frames.
     pub database_generation: u32,
-    /// How many examples there are.
+    /// Number of examples.
     pub examples: u32,
 }
 
-/// Where the simulation stands after `reset`, `pause`, `resume` or `restore`.
+/// State of the simulation after `reset`, `pause`, `resume` or `restore`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StateReply {
     /// Ticks since reset.
     pub tick: u64,
     /// Simulated time in seconds.
     pub sim_time_s: f64,
-    /// Whether the simulation's clock stands.
+    /// Whether the simulation is paused.
     pub paused: bool,
 }
 
-/// Where the simulation stands after `step`.
+/// State of the simulation after `step`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StepReply {
     /// Ticks since reset.
@@ -215,17 +215,17 @@ pub struct StepReply {
     pub sim_time_s: f64,
 }
 
-/// Names a kept state.
+/// Reply of `snapshot`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SnapshotReply {
-    /// What `restore` takes.
+    /// Id for `restore`.
     pub id: String,
 }
 
-/// What went wrong, in place of a reply.
+/// Error in place of a reply.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ErrorReply {
-    /// One of [`ErrorCode::name`]; a reader must expect codes that it does not know.
+    /// One of [`ErrorCode::name`]; readers must expect unknown codes.
     pub code: String,
     /// A sentence for a person.
     pub message: String,
@@ -234,7 +234,7 @@ pub struct ErrorReply {
 }
 
 impl ErrorReply {
-    /// An error of a known code.
+    /// Error with a known code.
     pub fn new(code: ErrorCode, message: impl Into<String>) -> Self {
         Self { code: code.name().to_owned(), message: message.into(), retryable: code.retryable() }
     }
@@ -245,12 +245,12 @@ impl ErrorReply {
     }
 }
 
-/// The codes that this version of the protocol has.
+/// Error codes of this version of the protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ErrorCode {
     /// No such method.
     RpcUnknown,
-    /// A method asked for through a wildcard.
+    /// A method called through a wildcard.
     RpcWildcard,
     /// Not JSON, an unknown or missing key, or a value out of range.
     RpcMalformed,
@@ -262,25 +262,25 @@ pub enum ErrorCode {
     UnknownTool,
     /// An object that the scene does not have.
     UnknownObject,
-    /// A snapshot that does not exist (any more).
+    /// A snapshot that does not exist, perhaps no longer.
     UnknownSnapshot,
-    /// A submitted scene that cannot be used; the message names line, key and what to do.
+    /// A submitted scene that cannot be used; the message names line, key and remedy.
     BadScene,
     /// A job that does not exist.
     UnknownJob,
     /// A client id that belongs to a job with another request.
     JobConflict,
-    /// The job's state does not allow it: cancelling what is over, resuming what runs, fetching what is not done.
+    /// The job's state does not allow the request: cancelling an ended job, resuming a running one, fetching an unfinished one.
     JobState,
-    /// Too many jobs are not over yet.
+    /// Too many jobs have not ended.
     TooManyJobs,
-    /// The daemon takes no jobs: its data folder cannot be used.
+    /// The daemon accepts no jobs, since its data folder cannot be used.
     JobsUnavailable,
-    /// Examples that cannot be used: no such file, damaged, or of another scene; the message says which.
+    /// Examples that cannot be used: no such file, damaged, or of another scene, as the message says.
     BadDatabase,
-    /// `?offset=` is no number or beyond the end.
+    /// `?offset=` is not a number, or beyond the end.
     BadOffset,
-    /// Nothing to answer with yet, for instance no frame.
+    /// The answer does not exist yet, for instance no frame.
     NotReady,
     /// The queue of requests is full.
     Busy,
@@ -318,7 +318,7 @@ impl ErrorCode {
         Self::Internal,
     ];
 
-    /// The `code` of the reply, also the counter in the status.
+    /// `code` of the reply, and name of the counter in the status.
     pub fn name(self) -> &'static str {
         match self {
             Self::RpcUnknown => "rpc_unknown",

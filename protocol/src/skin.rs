@@ -1,4 +1,4 @@
-//! Skin frames, on their way out: `PLSK`, a 64-byte header, positions, and normals where a scene asks for them.
+//! Skin frames, output: `PLSK`, a 64-byte header, positions, and normals if the scene publishes them.
 //!
 //! | format | positions | normals |
 //! | --- | --- | --- |
@@ -7,26 +7,26 @@
 
 use thiserror::Error;
 
-use crate::DecodeError;
 use crate::bytes::{Layout, finite, open};
+use crate::error::DecodeError;
 
 /// First bytes of a skin frame.
 pub const MAGIC: [u8; 4] = *b"PLSK";
 /// Length of the header in bytes.
 pub const HEADER_BYTES: usize = 64;
-/// A component of a 16-bit normal that means 1.
+/// Value of a 16-bit normal component that means 1.
 const NORMAL_ONE: f32 = 32767.0;
 
-/// What a frame says about itself.
+/// Header of a skin frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SkinHeader {
-    /// Counts published frames of this object, so that a reader sees what it missed.
+    /// Number of the published frame of this object; a gap shows lost frames.
     pub sequence: u64,
     /// Simulation tick of the frame.
     pub tick: u64,
     /// Simulated time in seconds.
     pub sim_time_s: f64,
-    /// Source time of the newest pose of any tool that this frame has seen; 0 if none.
+    /// Source time of the newest pose of any tool in this frame; 0 if none.
     pub newest_pose_source_time_ns: u64,
     /// Number of vertices.
     pub n_vertices: u32,
@@ -34,7 +34,7 @@ pub struct SkinHeader {
     pub flags: SkinFlags,
     /// Least confidence over the tools in contact; 0 means plain coarse skin.
     pub confidence: f32,
-    /// Rises when another example database is activated.
+    /// Rises with each activated example database.
     pub database_generation: u32,
     /// Metres per unit of a 16-bit offset; 0 in the f32 format.
     pub scale: f32,
@@ -47,7 +47,7 @@ pub struct SkinFlags {
     pub enriched: bool,
     /// Bit 2: the state was rolled back or a stage was skipped.
     pub degraded: bool,
-    /// Bit 4: the object is at rest and this is a repeat.
+    /// Bit 4: the object sleeps and the frame repeats the last one.
     pub sleeping: bool,
     /// Bit 8: normals follow the positions.
     pub normals: bool,
@@ -56,7 +56,7 @@ pub struct SkinFlags {
 }
 
 impl SkinFlags {
-    /// The `u32` of the wire.
+    /// Encodes the `u32`.
     pub fn bits(self) -> u32 {
         u32::from(self.enriched)
             | u32::from(self.degraded) << 1
@@ -65,7 +65,7 @@ impl SkinFlags {
             | u32::from(self.offsets_i16) << 4
     }
 
-    /// Reads the `u32` of the wire; unknown bits are ignored.
+    /// Decodes the `u32`; unknown bits are ignored.
     pub fn from_bits(bits: u32) -> Self {
         Self {
             enriched: bits & 1 != 0,
@@ -107,7 +107,7 @@ impl SkinHeader {
             .finish()
     }
 
-    /// Reads the first 64 bytes of a frame.
+    /// Decodes the first 64 bytes of a frame.
     pub fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
         let mut fields = open(bytes, MAGIC, HEADER_BYTES)?;
         let header = Self {
@@ -128,11 +128,11 @@ impl SkinHeader {
     }
 }
 
-/// Arrays that do not fit together.
+/// Arrays with different numbers of vertices.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{array} has {got} vertices, positions have {expected}")]
 pub struct EncodeError {
-    /// Which array.
+    /// Name of the array.
     pub array: &'static str,
     /// Vertices of the positions.
     pub expected: usize,
@@ -140,9 +140,9 @@ pub struct EncodeError {
     pub got: usize,
 }
 
-/// Replaces `out` by a frame in the f32 format; `out` is not reallocated once it has been large enough.
+/// Writes a frame in the f32 format to `out`, which is reallocated only while it is too small.
 ///
-/// `n_vertices`, `scale` and the format flags of `header` are overwritten by what the arrays say.
+/// `n_vertices`, `scale` and the format flags of `header` are replaced by those of the arrays.
 /// `positions`: `[n][3]`, world frame, metres. `normals`: `[n][3]`, unit.
 pub fn encode_f32_into(
     out: &mut Vec<u8>,
@@ -158,12 +158,12 @@ pub fn encode_f32_into(
     Ok(())
 }
 
-/// Replaces `out` by a frame in the 16-bit format.
+/// Writes a frame in the 16-bit format to `out`.
 ///
 /// ```text
 /// scale = max |positions - rest| / 32767      value = round((positions - rest) / scale)
 /// ```
-/// so that the error of a coordinate is at most `scale / 2`.
+/// The error of a coordinate is at most `scale / 2`.
 pub fn encode_i16_into(
     out: &mut Vec<u8>,
     header: &SkinHeader,
@@ -217,7 +217,7 @@ fn push_i16(out: &mut Vec<u8>, vector: [f32; 3], per_unit: f32) {
     }
 }
 
-/// A frame that still lies in the bytes that arrived.
+/// View of a frame in received bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SkinFrame<'a> {
     /// The header.
@@ -227,7 +227,7 @@ pub struct SkinFrame<'a> {
 }
 
 impl<'a> SkinFrame<'a> {
-    /// Reads a frame: the header is checked, the arrays are not looked at.
+    /// Checks the header; the arrays are not read.
     pub fn decode(bytes: &'a [u8]) -> Result<Self, DecodeError> {
         let header = SkinHeader::decode(bytes)?;
         let (expected, got) = (header.frame_bytes(), bytes.len() as u64);
@@ -252,7 +252,7 @@ impl<'a> SkinFrame<'a> {
 
     /// World positions `[n][3]` in metres. `rest` (of the mesh, same order) is used by the 16-bit format only.
     ///
-    /// None if the format needs `rest` and it has another number of vertices.
+    /// `None` if the format needs `rest` and it has another number of vertices.
     pub fn positions_m(&self, rest: &[[f32; 3]]) -> Option<Vec<[f32; 3]>> {
         let mut positions = self.vectors();
         if self.header.flags.offsets_i16 {
@@ -277,7 +277,7 @@ impl<'a> SkinFrame<'a> {
         })
     }
 
-    /// The positions as they lie in the message: `f32[n][3]` or `i16[n][3]`.
+    /// Bytes of the positions: `f32[n][3]` or `i16[n][3]`.
     pub fn position_bytes(&self) -> &'a [u8] {
         self.positions
     }

@@ -1,33 +1,33 @@
-//! Forces on a tool, on their way out: `PLWR`, 192 bytes.
+//! Forces on a tool, output: `PLWR`, 192 bytes.
 
-use crate::DecodeError;
 use crate::bytes::{Layout, finite, open_exact};
+use crate::error::DecodeError;
 
 /// First bytes of a wrench.
 pub const MAGIC: [u8; 4] = *b"PLWR";
 /// Length of a wrench in bytes.
 pub const BYTES: usize = 192;
 
-/// What one tool feels at one tick. World frame, SI units.
+/// Force and torque on one tool at one tick. World frame, SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Wrench {
     /// Rises by one with each wrench published for this tool.
     pub sequence: u64,
-    /// Simulation tick that this is the result of.
+    /// Simulation tick.
     pub tick: u64,
     /// Simulated time in seconds.
     pub sim_time_s: f64,
-    /// Sequence of the pose that was used.
+    /// Sequence of the pose of this tick.
     pub pose_sequence: u64,
-    /// Source time of the pose that was used, echoed so that a client measures motion-to-force on its own clock.
+    /// Source time of that pose, echoed so that a client measures motion-to-force on its own clock.
     pub pose_source_time_ns: u64,
     /// Force on the tool in newtons.
     pub force_n: [f64; 3],
     /// Torque on the tool about the proxy's origin in newton metres.
     pub torque_n_m: [f64; 3],
-    /// Contact point in metres; after release the last one, zero before the first contact.
+    /// Contact point in metres; the last one after release, zero before the first contact.
     pub contact_point_m: [f64; 3],
-    /// Position of the proxy, where the simulated tool is, in metres.
+    /// Position of the proxy, the simulated tool, in metres.
     pub proxy_position_m: [f64; 3],
     /// Orientation of the proxy, `x y z w`.
     pub proxy_orientation_xyzw: [f64; 4],
@@ -42,7 +42,7 @@ pub struct Wrench {
 /// State of a tool in a [`Wrench`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct WrenchFlags {
-    /// Bit 1: the tool touches something.
+    /// Bit 1: the tool is in contact.
     pub in_contact: bool,
     /// Bit 2: at least one contact slides.
     pub sliding: bool,
@@ -53,7 +53,7 @@ pub struct WrenchFlags {
 }
 
 impl WrenchFlags {
-    /// The `u32` of the wire.
+    /// Encodes the `u32`.
     pub fn bits(self) -> u32 {
         u32::from(self.in_contact)
             | u32::from(self.sliding) << 1
@@ -61,14 +61,14 @@ impl WrenchFlags {
             | u32::from(self.stale) << 3
     }
 
-    /// Reads the `u32` of the wire; unknown bits are ignored.
+    /// Decodes the `u32`; unknown bits are ignored.
     pub fn from_bits(bits: u32) -> Self {
         Self { in_contact: bits & 1 != 0, sliding: bits & 2 != 0, saturated: bits & 4 != 0, stale: bits & 8 != 0 }
     }
 }
 
 impl Wrench {
-    /// The 192 bytes of the wire.
+    /// Encodes 192 bytes.
     pub fn encode(&self) -> [u8; BYTES] {
         Layout::new(MAGIC)
             .u64(self.sequence)
@@ -88,7 +88,7 @@ impl Wrench {
             .finish()
     }
 
-    /// Reads 192 bytes; refuses non-finite numbers.
+    /// Decodes 192 bytes; refuses non-finite numbers.
     pub fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
         let mut fields = open_exact(bytes, MAGIC, BYTES)?;
         Self {

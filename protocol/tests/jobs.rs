@@ -22,7 +22,7 @@ fn a_job() -> Job {
         reason: None,
         started_unix_s: Some(1_700_000_001),
         finished_unix_s: None,
-        progress: Progress {
+        progress: JobProgress {
             stage: Some("examples".to_owned()),
             done: 40,
             rejected: 1,
@@ -67,7 +67,7 @@ fn replies_are_flat_and_come_back() {
     let reply = comes_back(&JobSubmitReply { created: true, job: job.clone() });
     assert_eq!((&reply["created"], &reply["id"]), (&true.into(), &"0003".into()));
     comes_back(&JobListReply { jobs: vec![job.clone()], older: 7 });
-    let progress = comes_back(&JobProgress::from(&job));
+    let progress = comes_back(&JobProgressMessage::from(&job));
     assert_eq!((&progress["stage"], &progress["rejected"]), (&"examples".into(), &1.into()));
     let status = comes_back(&JobStatus::from(&job));
     assert_eq!(status, json!({"id": "0003", "state": "running", "done": 40, "rejected": 1, "total": 128}));
@@ -78,7 +78,7 @@ fn a_reader_ignores_what_it_does_not_know() {
     let mut json = serde_json::to_value(a_job()).unwrap();
     json["colour"] = "green".into();
     assert_eq!(serde_json::from_value::<Job>(json).unwrap(), a_job());
-    let progress = JobProgress::from_json(br#"{"id": "1", "state": "done", "done": 8, "new": []}"#).unwrap();
+    let progress = JobProgressMessage::from_json(br#"{"id": "1", "state": "done", "done": 8, "new": []}"#).unwrap();
     assert_eq!((progress.state, progress.progress.done, progress.progress.total), (JobState::Done, 8, 0));
 }
 
@@ -152,23 +152,23 @@ proptest! {
         let _ = decode_request::<JobSubmitRequest>(&bytes).map(|request| request.check());
         let _ = decode_request::<JobRequest>(&bytes);
         let _ = decode_request::<JobFetchRequest>(&bytes);
-        let _ = JobProgress::from_json(&bytes);
+        let _ = JobProgressMessage::from_json(&bytes);
         let _ = serde_json::from_slice::<Job>(&bytes);
         let _ = serde_json::from_slice::<JobListReply>(&bytes);
     }
 
     #[test]
     fn truncated_messages_are_refused(cut in 0..200_usize) {
-        let json = serde_json::to_vec(&JobProgress::from(&a_job())).unwrap();
+        let json = serde_json::to_vec(&JobProgressMessage::from(&a_job())).unwrap();
         let cut = cut.min(json.len() - 1);
-        prop_assert!(JobProgress::from_json(&json[..cut]).is_err());
+        prop_assert!(JobProgressMessage::from_json(&json[..cut]).is_err());
     }
 
     #[test]
     fn any_progress_comes_back(done: u32, rejected: u32, total: u32, seconds_left in proptest::option::of(0.0..1e9_f64)) {
-        let progress = Progress { stage: None, done, rejected, total, seconds_left };
+        let progress = JobProgress { stage: None, done, rejected, total, seconds_left };
         let job = Job { progress, ..a_job() };
-        let sent = JobProgress::from(&job);
-        prop_assert_eq!(JobProgress::from_json(&serde_json::to_vec(&sent).unwrap()).unwrap(), sent);
+        let sent = JobProgressMessage::from(&job);
+        prop_assert_eq!(JobProgressMessage::from_json(&serde_json::to_vec(&sent).unwrap()).unwrap(), sent);
     }
 }

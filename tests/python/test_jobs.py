@@ -451,7 +451,7 @@ def test_the_command_does_it_all(daemon, client, small, tmp_path, undisturbed):
     assert "is " in watching.stderr.readline()
     watching.send_signal(signal.SIGINT)
     _, notes = watching.communicate(timeout=60)
-    assert watching.returncode == 130 and f"job {job_id} goes on without being watched" in notes, notes
+    assert watching.returncode == 130 and f"job {job_id} continues; `plica jobs watch" in notes, notes
     assert job(client, job_id)["state"] in ("queued", "running")
     assert json.loads(plica(daemon, "cancel", job_id).stdout)["state"] == "cancelled"
     watched = plica(daemon, "watch", job_id)

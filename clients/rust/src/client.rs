@@ -1,4 +1,4 @@
-//! The connection.
+//! Connection to a daemon.
 
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError, mpsc};
@@ -9,10 +9,11 @@ use plica_protocol::keys::{Keys, check_name};
 use plica_protocol::pose::Pose;
 use zenoh::{Session, Wait};
 
+use crate::error::ClientError;
+use crate::options::ClientOptions;
 use crate::publish::PosePublisher;
-use crate::{ClientError, ClientOptions};
 
-/// Zenoh's own close can hang for 10 s.
+/// Longest wait for Zenoh's close, which can hang for 10 s.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// A connection to one daemon. Closed when dropped, within two seconds.
@@ -31,9 +32,9 @@ impl std::fmt::Debug for Client {
 }
 
 impl Client {
-    /// Connects, or says why not at once (it does not wait for a daemon to appear).
+    /// Connects, or fails at once: it does not wait for a daemon to start.
     ///
-    /// That somebody listens does not mean that it is a daemon with this session: [`Client::status`] tells.
+    /// A connection does not prove that a daemon with this session listens: [`Client::status`] does.
     pub fn connect(options: &ClientOptions) -> Result<Self, ClientError> {
         let keys = Keys::new(&options.session)?;
         let config = options.zenoh_config()?;
@@ -44,12 +45,12 @@ impl Client {
         Ok(Self { session, keys, place: options.place(), timeout: options.timeout, publishers })
     }
 
-    /// The keys of this session.
+    /// Keys of this session.
     pub fn keys(&self) -> &Keys {
         &self.keys
     }
 
-    /// Where this client is connected, for messages.
+    /// Endpoint or configuration file, for messages.
     pub fn place(&self) -> &str {
         &self.place
     }
@@ -63,19 +64,19 @@ impl Client {
         publishers[tool].publish(pose)
     }
 
-    /// A publisher of poses of one tool: real-time priority, sent at once, dropped rather than waiting.
+    /// Publisher of poses of one tool: real-time priority, sent at once, dropped instead of waiting.
     pub fn pose_publisher(&self, tool: &str) -> Result<PosePublisher, ClientError> {
         check_name(tool)?;
         PosePublisher::declare(&self.session, self.keys.pose(tool), false)
     }
 
-    /// The same, but it waits for room on the bus instead of dropping, for replays.
+    /// Publisher that waits for room on the bus instead of dropping, for replays.
     pub fn lossless_pose_publisher(&self, tool: &str) -> Result<PosePublisher, ClientError> {
         check_name(tool)?;
         PosePublisher::declare(&self.session, self.keys.pose(tool), true)
     }
 
-    /// Closes the connection; gives up waiting after two seconds. The same as dropping the client.
+    /// Closes the connection, as a drop does; waits at most two seconds.
     pub fn close(self) {}
 }
 
@@ -86,11 +87,11 @@ impl Drop for Client {
     }
 }
 
-/// Closes on a helper thread, which is left behind if it takes longer than `timeout`.
+/// Closes on a thread of its own, which is abandoned after `timeout`.
 fn close_within(session: Session, timeout: Duration) {
     let (done, closed) = mpsc::channel();
     let closing = thread::Builder::new().name("plica-close".to_owned()).spawn(move || {
-        // An error here means that the link is gone already.
+        // An error means that the link is closed already.
         let _ = session.close().wait();
         let _ = done.send(());
     });

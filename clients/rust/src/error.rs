@@ -1,4 +1,4 @@
-//! What can go wrong between a client and a daemon.
+//! Errors between a client and a daemon.
 
 use std::time::Duration;
 
@@ -7,63 +7,65 @@ use plica_protocol::keys::NameError;
 use plica_protocol::rpc::ErrorReply;
 use thiserror::Error;
 
-/// What can go wrong between a client and a daemon.
+/// Errors between a client and a daemon.
 #[derive(Debug, Error)]
 pub enum ClientError {
-    /// Nobody listens there.
+    /// No daemon listens at the endpoint.
     #[error("no plicad answered on {place}: start one with `plicad serve` ({message})")]
     Connect {
         /// Endpoint or configuration file.
         place: String,
-        /// What Zenoh said.
+        /// Error of Zenoh.
         message: String,
     },
-    /// An endpoint or a configuration file that Zenoh does not accept.
+    /// Zenoh does not accept the endpoint or the configuration file.
     #[error("{place}: not a usable Zenoh configuration: {message}")]
     Config {
         /// Endpoint or configuration file.
         place: String,
-        /// What Zenoh said.
+        /// Error of Zenoh.
         message: String,
     },
     /// A session, tool or object name that cannot be part of a key.
     #[error(transparent)]
     Name(#[from] NameError),
-    /// The bus is there, but nobody serves that key.
-    #[error("nobody on {place} serves `{key}`: start `plicad serve`, or check the session and the names in its scene")]
+    /// The bus is connected, but no daemon serves the key.
+    #[error(
+        "no daemon on {place} serves `{key}`: start `plicad serve`, or check the session and the names in its scene"
+    )]
     NoAnswer {
         /// Endpoint or configuration file.
         place: String,
-        /// The key that was asked.
+        /// Queried key.
         key: String,
     },
     /// No answer in time.
     #[error("`{key}` did not answer within {timeout:?}")]
     TimedOut {
-        /// The key that was asked.
+        /// Queried key.
         key: String,
-        /// How long was waited.
+        /// Time waited.
         timeout: Duration,
     },
     /// The daemon answered with an error.
     #[error("{}: {}", .0.code, .0.message)]
     Refused(ErrorReply),
-    /// The daemon answered with something else than the protocol says.
+    /// The reply does not follow the protocol.
     #[error("`{key}` answered with a malformed message: {source}")]
     Malformed {
-        /// The key that was asked.
+        /// Queried key.
         key: String,
         /// What is wrong.
         source: DecodeError,
     },
-    /// The pieces do not make the whole.
-    #[error("`{key}`: the pieces have SHA-256 {got}, {expected} was announced")]
+    /// The chunks do not add up to the announced file.
+    #[error("`{key}`: the chunks have SHA-256 {got}, {expected} was announced")]
     Checksum {
-        /// The key that was asked.
+        /// Queried key.
         key: String,
-        /// What the daemon announced.
+        /// Checksum from the daemon.
         expected: String,
-        /// What arrived.
+        /// Checksum of the received bytes.
         got: String,
     },
     /// Zenoh refused an operation.

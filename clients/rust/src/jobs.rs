@@ -5,12 +5,14 @@ use std::time::Duration;
 
 use plica_protocol::chunk::ChunkHeader;
 use plica_protocol::jobs::{
-    Job, JobFetchRequest, JobFile, JobListReply, JobProgress, JobRequest, JobSubmitReply, JobSubmitRequest,
+    Job, JobFetchRequest, JobFile, JobListReply, JobProgressMessage, JobRequest, JobSubmitReply, JobSubmitRequest,
 };
 use sha2::{Digest, Sha256};
 
+use crate::client::Client;
+use crate::error::ClientError;
 use crate::query::{check_piece, check_sum, chunk_header};
-use crate::{Client, ClientError, Subscription};
+use crate::subscribe::Subscription;
 
 /// How long a submission may take: the daemon reads the scene and writes it to disk.
 const SUBMIT_TIMEOUT: Duration = Duration::from_secs(30);
@@ -60,9 +62,9 @@ impl Client {
         self.call("job_resume", &JobRequest { id: id.to_owned() })
     }
 
-    /// Progress of all jobs as it is published. Messages may be lost, the last one too: [`Client::job`] tells for sure.
-    pub fn subscribe_job_progress(&self, capacity: usize) -> Result<Subscription<JobProgress>, ClientError> {
-        self.subscribe_json(&self.keys.job_progress(), capacity, JobProgress::from_json)
+    /// Progress of all jobs as it is published. Messages may be lost, even the last one; [`Client::job`] returns the present state.
+    pub fn subscribe_job_progress(&self, capacity: usize) -> Result<Subscription<JobProgressMessage>, ClientError> {
+        self.subscribe_json(&self.keys.job_progress(), capacity, JobProgressMessage::from_json)
     }
 
     /// Writes a result of a job that is done into `out`, piece by piece, and checks its SHA-256. `progress` hears how

@@ -1,4 +1,4 @@
-//! Client of a Plica daemon: poses out, skins and wrenches in, requests and replies.
+//! Client of a Plica daemon: publishes poses, receives skins and wrenches, calls methods.
 //!
 //! ```no_run
 //! use std::time::Duration;

@@ -1,15 +1,15 @@
-//! What a client needs from the mesh reply: rest positions in world coordinates, and triangles.
+//! Rest positions in world coordinates and triangles, from the mesh reply.
 
 use gltf::Gltf;
 use thiserror::Error;
 
-/// A GLB that is not the protocol's mesh.
+/// Why a GLB is not a mesh of the protocol.
 #[derive(Debug, Error)]
 pub enum MeshError {
     /// Not a GLB file.
     #[error("not a GLB: {0}")]
     Gltf(#[from] Box<gltf::Error>),
-    /// It has no triangles with positions.
+    /// No triangles with positions.
     #[error("the GLB has no mesh with positions")]
     Empty,
 }
@@ -17,7 +17,7 @@ pub enum MeshError {
 /// An object at rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RestMesh {
-    /// What [`rest_positions`] gives.
+    /// Rest positions, as [`rest_positions`] returns them.
     pub positions_m: Vec<[f32; 3]>,
     /// Vertices of each triangle, counter-clockwise from outside.
     pub triangles: Vec<[u32; 3]>,

@@ -1,4 +1,4 @@
-//! Where and how to connect.
+//! Options of a connection.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -6,18 +6,18 @@ use std::time::Duration;
 use plica_protocol::{DEFAULT_ENDPOINT, DEFAULT_SESSION};
 use zenoh::Config;
 
-use crate::ClientError;
+use crate::error::ClientError;
 
-/// Where and how to connect.
+/// Options of a connection.
 #[derive(Debug, Clone)]
 pub struct ClientOptions {
     /// Zenoh endpoint of the daemon. Not used if there is a configuration file.
     pub endpoint: String,
     /// Session name of the keys.
     pub session: String,
-    /// Zenoh configuration file (JSON5), for TLS or a router; it then decides on mode and endpoints.
+    /// Zenoh configuration file (JSON5), for TLS or a router; it sets mode and endpoints.
     pub config_file: Option<PathBuf>,
-    /// How long a request may take.
+    /// Time-out of a request.
     pub timeout: Duration,
 }
 
@@ -33,7 +33,7 @@ impl Default for ClientOptions {
 }
 
 impl ClientOptions {
-    /// What a person needs to read to find the place: the endpoint or the file.
+    /// Endpoint or configuration file, for messages.
     pub fn place(&self) -> String {
         match &self.config_file {
             Some(file) => file.display().to_string(),
@@ -41,7 +41,7 @@ impl ClientOptions {
         }
     }
 
-    /// Client mode, one endpoint, no scouting; or what the file says.
+    /// Client mode, one endpoint, no scouting; or the configuration file.
     pub(crate) fn zenoh_config(&self) -> Result<Config, ClientError> {
         let fault = |error: zenoh::Error| ClientError::Config { place: self.place(), message: error.to_string() };
         if let Some(file) = &self.config_file {

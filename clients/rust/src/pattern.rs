@@ -2,16 +2,16 @@
 
 use std::f64::consts::TAU;
 
-/// Where and how far a scripted tool moves. The tool's z axis points up, its origin is the centre of its tip.
+/// Place and size of a scripted motion. The tool's z axis points up, its origin is the centre of its tip.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Path {
     /// Point on the surface under which the tool presses, in metres.
     pub surface_m: [f64; 3],
-    /// Radius of the tip: how far its origin is above the surface at first touch, in metres.
+    /// Radius of the tip in metres, the height of the tool's origin above the surface at first touch.
     pub tip_radius_m: f64,
-    /// How deep the tip presses, in metres.
+    /// Depth of the press, in metres.
     pub depth_m: f64,
-    /// How far above first touch the tip starts, in metres.
+    /// Start of the tip above first touch, in metres.
     pub clearance_m: f64,
     /// Length of a slide, diameter of a circle, in metres.
     pub span_m: f64,

@@ -1,4 +1,4 @@
-//! Poses on their way out.
+//! Publishing of poses.
 
 use std::hash::{BuildHasher, RandomState};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
@@ -10,7 +10,7 @@ use zenoh::pubsub::Publisher;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Session, Wait};
 
-use crate::ClientError;
+use crate::error::ClientError;
 
 /// Publishes the poses of one tool.
 pub struct PosePublisher {
@@ -35,14 +35,14 @@ impl PosePublisher {
         self.publish_bytes(pose.encode().to_vec(), false)
     }
 
-    /// Sends bytes as they are, marked as JSON or as binary. Nothing is checked.
+    /// Sends bytes unchecked, with the encoding of JSON or of binary poses.
     pub fn publish_bytes(&self, bytes: Vec<u8>, json: bool) -> Result<(), ClientError> {
         let encoding = Encoding::from(if json { ENCODING_JSON } else { ENCODING_BYTES });
         self.publisher.put(bytes).encoding(encoding).wait().map_err(ClientError::bus)
     }
 }
 
-/// Nanoseconds since 1970 that never step: the wall clock at the start, then a monotonic clock.
+/// Clock in nanoseconds since 1970 without steps: wall clock at the start, monotonic clock from then on.
 #[derive(Debug, Clone, Copy)]
 pub struct SourceClock {
     start: Instant,
@@ -56,7 +56,7 @@ impl SourceClock {
         Self { start: Instant::now(), start_unix_ns: since_1970.as_nanos() as u64 }
     }
 
-    /// Now, in nanoseconds.
+    /// Present time in nanoseconds.
     pub fn now_ns(&self) -> u64 {
         self.at_ns(Instant::now())
     }
@@ -76,7 +76,7 @@ impl Default for SourceClock {
 /// Numbers and times the poses of one publisher: a random `source_id`, sequences from 1 on, the time of the call.
 #[derive(Debug, Clone)]
 pub struct PoseSource {
-    /// Drawn when the source was made.
+    /// Random id of this source.
     pub source_id: u32,
     clock: SourceClock,
     sequence: u64,
@@ -97,7 +97,7 @@ impl PoseSource {
         Pose { sequence, source_time_ns, source_id, position_m, orientation_xyzw, ..Pose::default() }
     }
 
-    /// The clock that times the poses.
+    /// Clock of the source times.
     pub fn clock(&self) -> SourceClock {
         self.clock
     }

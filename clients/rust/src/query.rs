@@ -1,4 +1,4 @@
-//! Questions to the daemon: status, methods, meshes, the present skin.
+//! Queries and method calls: status, methods, meshes, the present skin.
 
 use std::time::Duration;
 
@@ -16,24 +16,26 @@ use zenoh::bytes::Encoding;
 use zenoh::query::{Reply, ReplyError};
 use zenoh::sample::Sample;
 
-use crate::{Client, ClientError, SkinMessage};
+use crate::client::Client;
+use crate::error::ClientError;
+use crate::subscribe::SkinMessage;
 
-/// Zenoh reports its own time-out as an error reply; this much later nothing comes any more.
+/// Extra wait for Zenoh's own time-out, which arrives as an error reply.
 const GRACE: Duration = Duration::from_millis(500);
-/// How long examples may take to be made ready.
+/// Time-out of `activate`, which prepares the tables of examples.
 const ACTIVATE_TIMEOUT: Duration = Duration::from_secs(60);
-/// Refuses a length that no mesh or snapshot has.
+/// Largest accepted length, above that of any mesh or snapshot.
 const MAX_WHOLE_BYTES: u64 = 1 << 31;
 
 impl Client {
-    /// What the daemon says about itself.
+    /// Status of the daemon.
     pub fn status(&self) -> Result<Status, ClientError> {
         let key = self.keys.status();
         let reply = self.ask(&key, None)?;
         parse_json(&key, &reply.payload().to_bytes())
     }
 
-    /// The same as it was sent, with keys that this version does not know.
+    /// Status as sent, including keys that this version does not know.
     pub fn status_json(&self) -> Result<Value, ClientError> {
         let key = self.keys.status();
         let reply = self.ask(&key, None)?;
@@ -69,13 +71,13 @@ impl Client {
         self.call("step", &StepRequest { ticks, poses })
     }
 
-    /// Enriches with other examples: `database` is the id of a job that is done, or a path on the daemon's machine. Takes
-    /// seconds, during which the simulation goes on with what it has.
+    /// Activates other examples: `database` is the id of a finished job, or a path on the daemon's machine. Takes seconds,
+    /// during which the simulation continues with the present examples.
     pub fn activate(&self, database: &str) -> Result<ActivateReply, ClientError> {
         self.call(Method::Activate.name(), &ActivateRequest { database: database.to_owned() })
     }
 
-    /// The mesh of an object as GLB: fetched in pieces, its SHA-256 checked.
+    /// Mesh of an object as GLB, fetched in chunks, with its SHA-256 checked.
     pub fn mesh(&self, object: &str) -> Result<Vec<u8>, ClientError> {
         check_name(object)?;
         self.fetch_whole(&self.keys.mesh(object))
@@ -98,7 +100,7 @@ impl Client {
             let piece = reply.payload().to_bytes();
             let header = chunk_header(key, &reply)?;
             if announced.as_ref().is_some_and(|first| first.sha256 != header.sha256) {
-                // It was replaced on the way: start again.
+                // Replaced between two chunks: start again.
                 whole.clear();
                 announced = None;
                 continue;
@@ -180,7 +182,7 @@ fn wrong_length(key: &str, expected: u64, got: u64) -> ClientError {
     ClientError::Malformed { key: key.to_owned(), source: DecodeError::Length { expected, got } }
 }
 
-/// Compares what has arrived with what was announced.
+/// Compares the checksum of the received bytes with the announced one.
 pub(crate) fn check_sum(key: &str, header: &ChunkHeader, arrived: Sha256) -> Result<(), ClientError> {
     let got: String = arrived.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
     if got == header.sha256 {

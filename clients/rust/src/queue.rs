@@ -1,15 +1,15 @@
-//! A bounded queue between a Zenoh callback and the reader: pushing never blocks and never grows.
+//! Bounded queue between a Zenoh callback and its reader: pushing never blocks and never allocates more.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Which message goes when the queue is full.
+/// Message that a full queue drops.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Overflow {
-    /// The oldest: latest wins.
+    /// The oldest one: the latest wins.
     DropOldest,
-    /// The one that arrives: what is kept has no holes.
+    /// The new one: the messages in the queue have no gaps.
     DropNewest,
 }
 
@@ -18,11 +18,11 @@ pub(crate) enum Overflow {
 pub struct StreamStats {
     /// Well-formed messages that arrived, dropped ones included.
     pub received: u64,
-    /// Messages that arrived and were dropped because the reader was slower.
+    /// Messages dropped here, since the reader was slower.
     pub dropped: u64,
-    /// Messages that are missing from the sequence: the daemon or the bus dropped them.
+    /// Gaps in the sequence: messages dropped by the daemon or the bus.
     pub missed: u64,
-    /// Messages that could not be read.
+    /// Messages that could not be decoded.
     pub malformed: u64,
 }
 
@@ -47,7 +47,7 @@ impl<T> Queue<T> {
         Self { state, filled: Condvar::new(), capacity: capacity.max(1), overflow }
     }
 
-    /// Keeps a message; `sequence` is its number in the stream, if the stream is numbered.
+    /// Appends a message; `sequence` is its number in the stream, if the stream is numbered.
     pub(crate) fn push(&self, item: T, sequence: Option<u64>) {
         let mut state = self.lock();
         state.stats.received += 1;
@@ -86,7 +86,7 @@ impl<T> Queue<T> {
 }
 
 impl<T> State<T> {
-    /// A sequence that goes back is a daemon that started anew: nothing is missing.
+    /// A falling sequence means that the daemon was restarted: nothing is missing.
     fn count_missed(&mut self, sequence: Option<u64>) {
         let Some(sequence) = sequence else { return };
         if let Some(next) = self.next_sequence {

@@ -1,4 +1,4 @@
-//! Recordings: MCAP files that robotics tools open.
+//! Recordings: MCAP files, which robotics tools can open.
 //!
 //! One channel per key of the bus, the key as topic, messages byte by byte as they arrived:
 //!
@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-/// A recording that cannot be written or read.
+/// Why a recording cannot be written or read.
 #[derive(Debug, Error)]
 #[error("{}: {message}", path.display())]
 pub struct RecordingError {
@@ -28,7 +28,7 @@ pub struct RecordingError {
     pub message: String,
 }
 
-/// What kind of message a key carries.
+/// Kind of the messages on a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// A pose, 96 bytes.
@@ -44,7 +44,7 @@ pub enum Kind {
 impl Kind {
     const ALL: [Self; 4] = [Self::Pose, Self::JsonPose, Self::Skin, Self::Wrench];
 
-    /// The kind of message on a key, by the key's last part. None for other keys.
+    /// Kind by the last part of the key; `None` for other keys.
     pub fn of(key: &str, json: bool) -> Option<Self> {
         match key.rsplit('/').next() {
             Some("pose") if json => Some(Self::JsonPose),
@@ -89,13 +89,13 @@ const WRENCH_LAYOUT: &str = "little-endian; u8[4] magic PLWR; u16 version; u16 b
 /// One message of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Recorded {
-    /// The key that it was published on.
+    /// Key of the message.
     pub key: String,
-    /// What it is.
+    /// Kind of the message.
     pub kind: Kind,
     /// When the recorder received it, in nanoseconds since 1970.
     pub log_time_ns: u64,
-    /// The message as it was.
+    /// Bytes of the message.
     pub bytes: Vec<u8>,
 }
 
@@ -179,7 +179,7 @@ fn fault(path: &Path, error: impl std::fmt::Display) -> RecordingError {
     RecordingError { path: path.to_owned(), message: error.to_string() }
 }
 
-/// The tool of a pose key, of whatever session.
+/// Tool of a pose key of any session.
 pub fn tool_of(key: &str) -> Option<&str> {
     let parts: Vec<&str> = key.split('/').collect();
     match parts.as_slice() {

@@ -1,4 +1,4 @@
-//! Streams on their way in. Callbacks decode, store and return; a panic in one would kill the link, so none escapes.
+//! Subscriptions. Callbacks decode, store and return. A panic in a callback would end the link, so panics are caught.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -13,22 +13,23 @@ use zenoh::bytes::Encoding;
 use zenoh::pubsub::Subscriber;
 use zenoh::sample::Sample;
 
+use crate::client::Client;
+use crate::error::ClientError;
 use crate::queue::{Overflow, Queue, StreamStats};
-use crate::{Client, ClientError};
 
-/// A skin frame as it arrived.
+/// A received skin frame.
 #[derive(Debug, Clone)]
 pub struct SkinMessage {
     /// Its header.
     pub header: SkinHeader,
     /// The whole message.
     pub bytes: Vec<u8>,
-    /// When it arrived.
+    /// Time of arrival.
     pub received: Instant,
 }
 
 impl SkinMessage {
-    /// The frame in the bytes; they have been checked.
+    /// View of the frame in the checked bytes.
     pub fn frame(&self) -> Result<SkinFrame<'_>, DecodeError> {
         SkinFrame::decode(&self.bytes)
     }
@@ -39,29 +40,29 @@ impl SkinMessage {
     }
 }
 
-/// A wrench and when it arrived.
+/// A received wrench.
 #[derive(Debug, Clone, Copy)]
 pub struct WrenchMessage {
     /// The wrench.
     pub wrench: Wrench,
-    /// When it arrived.
+    /// Time of arrival.
     pub received: Instant,
 }
 
-/// A message that nobody has looked at.
+/// A received message, not decoded.
 #[derive(Debug, Clone)]
 pub struct RawMessage {
-    /// The key that it was published on.
+    /// Key of the message.
     pub key: String,
     /// Its bytes.
     pub bytes: Vec<u8>,
-    /// Whether the sender marked it as JSON.
+    /// Whether its encoding is JSON.
     pub json: bool,
-    /// When it arrived.
+    /// Time of arrival.
     pub received: Instant,
 }
 
-/// Messages that wait for their reader. Ends when dropped.
+/// Subscription with a queue of received messages. Ends on drop.
 pub struct Subscription<T> {
     queue: Arc<Queue<T>>,
     _subscribers: Vec<Subscriber<()>>,
@@ -85,7 +86,7 @@ impl<T> Subscription<T> {
 }
 
 impl Client {
-    /// Frames of an object; a slow reader gets the newest one and misses the others.
+    /// Frames of an object; a slow reader gets only the newest.
     pub fn subscribe_skin(&self, object: &str) -> Result<Subscription<SkinMessage>, ClientError> {
         check_name(object)?;
         self.subscribe(&[self.keys.skin(object)], Queue::new(1, Overflow::DropOldest), |sample| {
@@ -95,7 +96,7 @@ impl Client {
         })
     }
 
-    /// Wrenches of a tool, at most `capacity` of them waiting; further ones are dropped and counted.
+    /// Wrenches of a tool, at most `capacity` waiting; more are dropped and counted.
     pub fn subscribe_wrenches(&self, tool: &str, capacity: usize) -> Result<Subscription<WrenchMessage>, ClientError> {
         check_name(tool)?;
         self.subscribe(&[self.keys.wrench(tool)], Queue::new(capacity, Overflow::DropNewest), |sample| {
@@ -104,7 +105,7 @@ impl Client {
         })
     }
 
-    /// Whatever is published on some key expressions, in order of arrival, at most `capacity` waiting.
+    /// All messages on some key expressions, in order of arrival, at most `capacity` waiting.
     pub fn subscribe_raw(
         &self,
         key_expressions: &[String],
@@ -155,7 +156,7 @@ impl Client {
     }
 }
 
-/// Keeps a panic from reaching Zenoh's receiving thread.
+/// Catches panics, which would end Zenoh's receiving thread.
 fn guarded<T>(callback: impl Fn(T) + Send + Sync + 'static) -> impl Fn(T) + Send + Sync + 'static {
     move |value| {
         let _ = catch_unwind(AssertUnwindSafe(|| callback(value)));

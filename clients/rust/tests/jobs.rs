@@ -8,7 +8,7 @@ use std::io::{BufRead, BufReader};
 use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
-use plica_client::protocol::jobs::{JobFile, JobKind, JobProgress, JobState, JobSubmitRequest};
+use plica_client::protocol::jobs::{JobFile, JobKind, JobProgressMessage, JobState, JobSubmitRequest};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -61,7 +61,7 @@ fn a_job_is_submitted_as_it_was_typed() {
 
     let output = plica(&daemon, &["submit", "--client-id", "again"]).output().unwrap();
     assert_eq!(last_line(&output)["created"], false);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("`again` has been submitted before, as job 0004"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("`again` was submitted before, as job 0004"));
 }
 
 #[test]
@@ -113,7 +113,7 @@ fn watching_ends_with_the_job() {
     let (message, _) = error(&daemon, &["watch", FAILED]);
     assert_eq!(
         message,
-        "job 0002 is failed: exit code 1: disk full; `plica jobs resume 0002` goes on with what is finished"
+        "job 0002 is failed: exit code 1: disk full; `plica jobs resume 0002` continues it with its finished examples"
     );
 }
 
@@ -126,7 +126,7 @@ fn ctrl_c_ends_the_watching_and_not_the_job() {
     assert!(notes.any(|line| line.unwrap().contains("job 0004 is running")), "it ended early");
     assert!(Command::new("kill").args(["-INT", &watching.id().to_string()]).status().unwrap().success());
     let notes: Vec<_> = notes.map(Result::unwrap).collect();
-    assert!(notes.iter().any(|line| line.contains("job 0004 goes on without being watched")), "{notes:?}");
+    assert!(notes.iter().any(|line| line.contains("job 0004 continues; `plica jobs watch")), "{notes:?}");
     let output = watching.wait_with_output().unwrap();
     assert_eq!((output.status.code(), &last_line(&output)["state"]), (Some(130), &"running".into()));
 }
@@ -156,7 +156,7 @@ fn the_library_hears_progress() {
     let daemon = SmallDaemon::start();
     let client = daemon.client();
     let messages = client.subscribe_job_progress(16).unwrap();
-    let running = JobProgress::from(&client.job(ENDLESS).unwrap());
+    let running = JobProgressMessage::from(&client.job(ENDLESS).unwrap());
     let key = client.keys().job_progress();
     let deadline = std::time::Instant::now() + Duration::from_secs(10);
     let heard = loop {

@@ -12,10 +12,10 @@ pub enum TrajectoryError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// A line that is not what it should be.
+    /// A malformed line.
     #[error("{}:{line}: {message}", path.display())]
     Line {
         /// The file.
@@ -25,13 +25,13 @@ pub enum TrajectoryError {
         /// What is wrong.
         message: String,
     },
-    /// No pose in it.
-    #[error("{}: no poses in it", path.display())]
+    /// A file without poses.
+    #[error("{}: the file has no poses", path.display())]
     Empty {
         /// The file.
         path: PathBuf,
     },
-    /// A workspace without room.
+    /// An empty workspace.
     #[error("workspace from {min_m:?} to {max_m:?} m has no room: each min must be below its max, all finite")]
     Workspace {
         /// Lower corner.

@@ -1,4 +1,4 @@
-//! Mapping a recorded motion into the room that a scene has.
+//! Fits a recorded motion into the workspace of a scene.
 
 use std::collections::HashMap;
 
@@ -7,14 +7,14 @@ use crate::pose::TrackedPose;
 use crate::terrain::Terrain;
 use crate::workspace::Workspace;
 
-/// How deep a fitted motion presses, at most, unless told otherwise.
+/// Default depth of a fitted motion, at most \[m\].
 const DEPTH_M: f64 = 0.008;
-/// The same as a share of the object's height in its middle.
+/// Default depth at most, as a share of the object's height in its middle.
 const DEPTH_SHARE: f64 = 0.3;
-/// How far above first touch the room for a fitted motion ends.
+/// Upper end of the workspace above first touch \[m\].
 const CLEARANCE_M: f64 = 0.03;
 
-/// What [`fit`] did: `p' = to_m + scale (p - from_m)`.
+/// Map found by [`fit`]: `p' = to_m + scale (p - from_m)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
     /// Uniform scale.
@@ -32,8 +32,8 @@ pub struct Fit {
 /// q' = q q_0^-1                 q_0: the tool's first orientation
 /// ```
 /// One scale for all axes keeps the motion's shape; the tightest axis fills its extent, and s may be above 1. An axis
-/// without extent does not count; a trajectory that stands still is only moved (s = 1). How a marker happened to sit on
-/// the hand says nothing about a scene's tool: it starts upright (z up) and turns as the hand turned. Times stay.
+/// without extent does not count; a trajectory without motion is only moved (s = 1). The tool starts upright (z up) and turns
+/// as the hand turned, since the mount of a marker is unrelated to the scene's tool. Times are unchanged.
 pub fn fit(poses: &mut [TrackedPose], workspace: Workspace) -> Result<Fit, TrajectoryError> {
     let Workspace { min_m, max_m } = workspace;
     let has_room = (0..3).all(|i| min_m[i] < max_m[i] && (max_m[i] - min_m[i]).is_finite());
@@ -56,13 +56,13 @@ pub fn fit(poses: &mut [TrackedPose], workspace: Workspace) -> Result<Fit, Traje
 }
 
 /// Fits a motion into the room above an object with [`fit`], then moves it down (or up) until its deepest pose presses
-/// `depth_m` into the surface. `tip_radius_m`: how far the tool reaches below its origin.
+/// `depth_m` into the surface. `tip_radius_m`: extent of the tool below its origin.
 ///
 /// ```text
-/// room: the middle half of the object, from depth below first touch in its middle to 30 mm above that
+/// workspace: the middle half of the object, from depth below first touch in its middle to 30 mm above that
 /// p'_z = p_z - (h + depth)      h = min over poses of (p_z - tip radius - height of the surface under p)
 /// ```
-/// One scale keeps the motion's shape, so a motion that is wide and flat would otherwise hover in the middle of the room.
+/// Without the second step a wide and flat motion would hover in the middle of the workspace, since it has one scale.
 pub fn fit_above(
     poses: &mut [TrackedPose],
     terrain: &Terrain,
@@ -82,7 +82,7 @@ pub fn fit_above(
     Ok(done)
 }
 
-/// How deep a fitted motion presses into an object unless told otherwise, in metres: 8 mm, at most 0.3 of its height.
+/// Default depth of a motion fitted to an object, in metres: 8 mm, at most 0.3 of its height.
 pub fn fitted_depth_m(terrain: &Terrain) -> f64 {
     let height_m = middle_top_m(terrain) - terrain.bounds().min_m[2];
     DEPTH_M.min(DEPTH_SHARE * height_m)

@@ -8,8 +8,8 @@ use crate::pose::{CSV_HEADER, TrackedPose};
 
 const TUM_COLUMNS: [&str; 8] = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"];
 
-/// Decides which poses count: tool, position \[m\] and orientation `xyzw` of a line give the normalised orientation, or
-/// a sentence that says why the line is refused.
+/// Check of a pose: maps tool, position \[m\] and orientation `xyzw` of a line to the normalised orientation, or to a sentence
+/// why the line is refused.
 pub trait Gate: Fn(Option<&str>, [f64; 3], [f64; 4]) -> Result<[f64; 4], String> {}
 
 impl<F: Fn(Option<&str>, [f64; 3], [f64; 4]) -> Result<[f64; 4], String>> Gate for F {}
@@ -31,7 +31,7 @@ pub fn read(path: impl AsRef<Path>, gate: impl Gate) -> Result<Vec<TrackedPose>,
     Ok(numbered.into_iter().map(|(_, pose)| pose).collect())
 }
 
-/// A line number, from 1 on, and what is wrong there.
+/// Line number, from 1 on, and error.
 type Fault = (u64, String);
 
 fn not_text(bytes: &[u8], at: usize) -> Fault {

@@ -1,10 +1,10 @@
-//! The top of an object, as motions are fitted to it.
+//! Upper surface of an object, for fitting motions.
 
 use crate::workspace::Workspace;
 
 /// Cells of the look-up along x and along y.
 const N_CELLS: usize = 64;
-/// Shares of a point on a triangle's rim may be this far below 0.
+/// Tolerance of the shares of a point on a triangle's edge.
 const ON_RIM: f64 = 1e-9;
 
 /// A surface of triangles seen from above, z up.
@@ -17,8 +17,8 @@ pub struct Terrain {
 }
 
 impl Terrain {
-    /// Of positions `[n][3]` in metres and triangles in either orientation; none without a triangle, or if one names a
-    /// vertex that is not there.
+    /// From positions `[n][3]` in metres and triangles of either orientation; `None` without a triangle, or if a vertex index is
+    /// out of range.
     pub fn new(positions_m: &[[f32; 3]], triangles: &[[u32; 3]]) -> Option<Self> {
         let corner = |v: u32| positions_m.get(v as usize).map(|p| p.map(f64::from));
         let triangles = triangles.iter().map(|&[a, b, c]| Some([corner(a)?, corner(b)?, corner(c)?]));
@@ -37,12 +37,12 @@ impl Terrain {
         Some(terrain)
     }
 
-    /// The box around it.
+    /// Bounding box.
     pub fn bounds(&self) -> Workspace {
         self.bounds
     }
 
-    /// Height of the topmost triangle at a place, in metres; none beside the surface.
+    /// Height of the topmost triangle at `[x, y]`, in metres; `None` beside the surface.
     ///
     /// ```text
     /// z = w_a z_a + w_b z_b + w_c z_c     w: shares of the triangle's area in the plane, none below 0
@@ -60,7 +60,7 @@ impl Terrain {
         self.cells[cx * N_CELLS + cy].iter().filter_map(height).reduce(f64::max)
     }
 
-    /// The cell of a place; the nearest one for a place beside the bounds.
+    /// Cell of a point; the nearest cell for a point outside of the bounds.
     fn cell(&self, place: [f64; 2]) -> [usize; 2] {
         let Workspace { min_m, max_m } = self.bounds;
         std::array::from_fn(|i| {

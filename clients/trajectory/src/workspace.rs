@@ -1,4 +1,4 @@
-//! A box in space.
+//! Workspace: a box in the world frame.
 
 /// A box in the world frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -10,7 +10,7 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// The box around some points; none around none.
+    /// Bounding box of points; `None` without points.
     pub(crate) fn around<'a>(points: impl IntoIterator<Item = &'a [f64; 3]>) -> Option<Self> {
         let bounds = points.into_iter().map(|p| Self { min_m: *p, max_m: *p });
         bounds.reduce(|a, b| Self {

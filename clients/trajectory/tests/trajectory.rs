@@ -58,11 +58,11 @@ fn faults_name_file_and_line() {
     assert_eq!(csv("0,a,0,0,0,0,0,0,2\n"), "a.csv:2: orientation has length 2, expected 1 within 0.01");
     assert_eq!(csv("0,a,2000,0,0,0,0,0,1\n"), "a.csv:2: `position` is 2000, at most 1000 is accepted");
     assert!(csv("0,a/b,0,0,0,0,0,0,1\n").starts_with("a.csv:2: `a/b` is not a name"));
-    assert_eq!(csv(""), "a.csv: no poses in it");
+    assert_eq!(csv(""), "a.csv: the file has no poses");
     assert!(read_text("a.csv", "t,x\n").unwrap_err().starts_with("a.csv:1: the header must be `time_s,tool,px"));
     assert_eq!(tum("0 1 2 3\n"), "a.tum:1: 4 columns, expected `timestamp tx ty tz qx qy qz qw`");
     assert_eq!(tum("# x\n0 1 2 3 0 0 0 one\n"), "a.tum:2: `qw` is `one`, expected a number");
-    assert_eq!(tum(""), "a.tum: no poses in it");
+    assert_eq!(tum(""), "a.tum: the file has no poses");
     assert!(read("no/such/file.csv", gate).unwrap_err().to_string().starts_with("no/such/file.csv: "));
 }
 

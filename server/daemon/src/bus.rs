@@ -1,7 +1,7 @@
-//! Everything that touches Zenoh. The simulation thread never comes here: queues and triple buffers part the two.
+//! The bus: all code that uses Zenoh. Queues and triple buffers separate it from the simulation thread.
 //!
-//! Callbacks run on Zenoh's receiving threads: they decode, store and return, and no panic leaves them. Streams are
-//! published, and questions answered, by threads of their own, so that a frozen client can hold up a reply but no tick.
+//! Callbacks run on Zenoh's receiving threads: they decode, store and return, and panics are caught. Streams are
+//! published and queries answered by threads of their own, so that a frozen client can block a reply but no tick.
 
 mod activate;
 mod counters;
@@ -48,10 +48,10 @@ pub use scene_info::SceneInfo;
 pub use session::{BusOptions, DEFAULT_ZENOH_CONFIG};
 use shared::Shared;
 
-/// `Session::close` can hang for ten seconds when a client is frozen.
+/// Longest wait for `Session::close`, which can hang for ten seconds when a client is frozen.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// What a bus is made of.
+/// Parts of a bus.
 pub struct Parts {
     /// From [`Bus::open`].
     pub session: Session,
@@ -59,17 +59,17 @@ pub struct Parts {
     pub ports_of_bus: Vec<u16>,
     /// Keys of the session.
     pub keys: Keys,
-    /// What there is to publish.
+    /// Names, rates and formats of the scene.
     pub scene: SceneInfo,
     /// The scene's model.
     pub model: Arc<Model>,
-    /// What makes examples ready.
+    /// Loader of databases.
     pub enrichment: Enrichment,
-    /// The simulation thread's other ends.
+    /// Far ends of the simulation thread's queues.
     pub ports: Ports,
-    /// What the simulation thread was granted.
+    /// Privileges granted to the simulation thread.
     pub grants: Grants,
-    /// Jobs, or why there are none.
+    /// Jobs, or the reason why there are none.
     pub jobs: Jobs,
 }
 
@@ -87,7 +87,7 @@ pub struct Bus {
     _declared: Declared,
 }
 
-/// What receives from Zenoh and ends with the bus.
+/// Declarations that receive from Zenoh, undeclared with the bus.
 struct Declared {
     _poses: zenoh::pubsub::Subscriber<()>,
     _queryables: Vec<zenoh::query::Queryable<()>>,

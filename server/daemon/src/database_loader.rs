@@ -1,4 +1,4 @@
-//! From a database of examples to detail on the skin of a running simulation.
+//! Loads a database of examples and prepares it for enrichment.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,33 +10,33 @@ use plica_sim::Model;
 use plica_sim::enrichment::{Enricher, EnricherError, EnrichmentOptions, LiveEnrichment};
 use plica_training::{Database, DatabaseError, DatabaseKind};
 
-/// A larger file is no database that a simulation can be enriched with.
+/// Largest accepted database file.
 const MAX_BYTES: u64 = 4 << 30;
 
 /// Why a database cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum EnrichmentError {
-    /// It is no file of a sensible size.
+    /// Not an ordinary file, or too large.
     #[error("{path}: {problem}", path = path.display())]
     File {
-        /// What was named.
+        /// Given path.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Problem.
         problem: String,
     },
     /// A file that belongs to the scene cannot be read.
     #[error(transparent)]
     Hash(#[from] HashError),
-    /// It is damaged, of another version, or of another scene.
+    /// Damaged, of another version, or of another scene.
     #[error(transparent)]
     Database(#[from] DatabaseError),
-    /// It holds what must never be learned from.
+    /// A database of held-out interactions, which must never be trained on.
     #[error("{path}: holds held-out interactions, made to evaluate; name a database of kind training", path = path.display())]
     HeldOut {
         /// The file.
         path: PathBuf,
     },
-    /// The method makes nothing of it.
+    /// The method cannot use it.
     #[error("{path}: {source}", path = path.display())]
     Enricher {
         /// The file.
@@ -46,7 +46,7 @@ pub enum EnrichmentError {
     },
 }
 
-/// What it takes to enrich a scene, but for the examples.
+/// Scene hash and method, for loading databases.
 #[derive(Debug, Clone)]
 pub struct Enrichment {
     model: Arc<Model>,
@@ -54,17 +54,17 @@ pub struct Enrichment {
     options: EnrichmentOptions,
 }
 
-/// Examples made ready.
+/// Prepared examples.
 #[derive(Debug, Clone)]
 pub struct Ready {
     /// Tables of the method.
     pub enricher: Arc<Enricher>,
-    /// How many examples it has learned from.
+    /// Number of training examples.
     pub n_examples: usize,
 }
 
 impl Enrichment {
-    /// Of a scene and its model.
+    /// Loader for a scene and its model.
     ///
     /// # Errors
     /// A mesh file of the scene cannot be read.
@@ -88,15 +88,15 @@ impl Enrichment {
         Ok(Ready { enricher: Arc::new(enricher), n_examples: database.examples.len() })
     }
 
-    /// What the simulation thread is given.
+    /// Enrichment for the simulation thread.
     pub fn live(&self, ready: &Ready) -> Box<LiveEnrichment> {
         let live = LiveEnrichment::new(&self.model, Arc::clone(&ready.enricher));
-        // A copy: every page of it has been written, so that the simulation thread faults on none.
+        // A copy, so that every page is written already and the simulation thread faults on none.
         Box::new(live.clone())
     }
 }
 
-/// Examples that a scene starts with, if it names some.
+/// Prepared examples of the database that a scene starts with, if it names one.
 ///
 /// # Errors
 /// See [`EnrichmentError`].
@@ -107,7 +107,7 @@ pub fn at_start(config: &Config, model: &Arc<Model>) -> Result<Option<(Enrichmen
     Ok(Some((enrichment, ready)))
 }
 
-/// A device or a pipe would be read without end.
+/// Refuses devices and pipes, which would be read without end.
 fn check_file(path: &Path) -> Result<(), EnrichmentError> {
     let failed = |problem: String| EnrichmentError::File { path: path.to_owned(), problem };
     let place = if path.is_relative() { "; the path begins where this program was started" } else { "" };

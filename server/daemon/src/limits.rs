@@ -1,10 +1,10 @@
-//! What the bus can carry.
+//! Size limits of the bus.
 
 use plica_protocol::skin::{SkinFlags, SkinHeader};
 use plica_scene::Config;
 use plica_scene::scene::PositionFormat;
 
-/// The transmit queue holds just over this; a larger frame would never arrive.
+/// Largest frame in bytes; the transmit queue holds little more, and a larger frame would never arrive.
 pub const MAX_FRAME_BYTES: u64 = 1_000_000;
 
 /// A skin frame that does not fit the transmit queue.

@@ -1,4 +1,4 @@
-//! The loop without bus or clock, fed with timed poses: what `simulate` and `bench` run on.
+//! The loop without bus or clock, fed with timed poses, for `simulate` and `bench`.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use plica_sim::{Model, TickReport};
 
 use crate::realtime::{Frame, Loop, LoopOptions, Ports, Turn, TurnProbe};
 
-/// A loop that is told its poses by time.
+/// A loop with a list of timed poses.
 pub struct Replay {
     core: Loop,
     ports: Ports,
@@ -23,18 +23,18 @@ impl Replay {
         Self { core, ports, poses, next: 0 }
     }
 
-    /// Enriches the skin from now on.
+    /// Activates an enrichment.
     pub fn enrich(&mut self, live: Box<LiveEnrichment>) {
         self.core.enrich(live);
     }
 
-    /// Takes one tick: the poses whose time has come arrive first.
+    /// Delivers the poses that are due, then runs one tick.
     pub fn tick(&mut self, probe: &mut impl TurnProbe) -> TickReport {
         self.deliver();
         self.turn(probe)
     }
 
-    /// Hands over the poses whose time has come.
+    /// Delivers the poses that are due.
     pub fn deliver(&mut self) {
         // Half a microsecond covers the rounding of k h against a decimal time.
         let clock_s = self.core.state().sim_time_s() + 0.5e-6;

@@ -13,10 +13,10 @@ use crate::database_loader::{Enrichment, EnrichmentError};
 use crate::limits::{FrameTooLarge, check_frame};
 use crate::realtime::{Grants, Loop, LoopOptions, Running, ThreadOptions, spawn};
 
-/// Why a daemon does not start.
+/// Why a daemon cannot start.
 #[derive(Debug, thiserror::Error)]
 pub enum ServerError {
-    /// The scene makes no model.
+    /// The scene has no model.
     #[error(transparent)]
     Scene(#[from] SceneModelError),
     /// Frames would never arrive.
@@ -31,7 +31,7 @@ pub enum ServerError {
     /// The examples that it should start with cannot be used.
     #[error(transparent)]
     Enrichment(#[from] EnrichmentError),
-    /// Another daemon has the data folder.
+    /// The data folder is locked by another daemon.
     #[error(transparent)]
     Data(#[from] DataFolderError),
 }
@@ -50,7 +50,7 @@ impl Server {
         Self::start_with_jobs(config, options, lock_step, || Ok((Jobs::unavailable("it was started without"), None)))
     }
 
-    /// The same with jobs, which are opened once the bus is: that another daemon has the port is told first.
+    /// Starts with jobs, which are opened after the bus, so that a taken port is reported first.
     pub fn start_with_jobs(
         config: &Config,
         options: &BusOptions,
@@ -90,7 +90,7 @@ impl Server {
         &self.model
     }
 
-    /// What the operating system granted to the simulation thread.
+    /// Privileges that the operating system granted to the simulation thread.
     pub fn grants(&self) -> &Grants {
         self.simulation.grants()
     }

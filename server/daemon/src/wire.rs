@@ -1,4 +1,4 @@
-//! The one place where wire types become simulation types and back.
+//! Conversion between wire types and simulation types, in this file only.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use plica_protocol::pose::Pose;
@@ -18,7 +18,7 @@ pub fn pose_sample(pose: &Pose) -> PoseSample {
     let translation = Translation3::from(pose.position_m);
     PoseSample {
         sequence: pose.sequence,
-        // 0 on the wire means that the source does not know its time.
+        // 0 on the wire is an unknown time.
         source_time_ns: (pose.source_time_ns != 0).then_some(pose.source_time_ns),
         valid: pose.valid,
         pose: Isometry3::from_parts(translation, rotation),
@@ -50,7 +50,7 @@ pub fn skin_header(frame: &Frame, sequence: u64) -> SkinHeader {
     }
 }
 
-/// What one tool feels.
+/// Wrench of a tool.
 pub fn wrench(frame: &ToolFrame, sequence: u64) -> Wrench {
     let r = &frame.reading;
     let (proxy_position_m, proxy_orientation_xyzw) = position_and_xyzw(&r.proxy);
@@ -118,7 +118,7 @@ pub fn object_status(reading: &Reading) -> ObjectStatus {
     }
 }
 
-/// What the operating system granted.
+/// Privileges that the operating system granted.
 pub fn realtime(grants: &Grants) -> Realtime {
     Realtime {
         scheduling: if grants.fifo { Scheduling::Fifo } else { Scheduling::Normal },
@@ -152,7 +152,7 @@ pub fn activate_reply(outcome: &Outcome, n_examples: usize) -> ActivateReply {
     }
 }
 
-/// Why an order was not obeyed.
+/// Error reply of a refused command.
 pub fn refusal(refusal: Refusal) -> ErrorReply {
     let (code, message) = match refusal {
         Refusal::NotPaused => (ErrorCode::NotPaused, "step needs a paused simulation; call rpc/pause first"),

@@ -1,4 +1,4 @@
-//! The folder of a job that is started by hand: scene, the files it names, and what is asked.
+//! Folder of a job that is started from the command line: scene, files that it names, options.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};
@@ -10,53 +10,53 @@ use plica_training::{
     DatabaseKind, TrainingError, TrainingFolder, TrainingJob, TrainingReport, Writer, now_unix_s, write_atomically,
 };
 
-use crate::folder::{JobFolder, Standing};
+use crate::folder::{JobFolder, StoredStatus};
 
-/// What is asked on the command line.
+/// Options of a job on the command line.
 #[derive(Debug, Clone, Copy)]
-pub struct JobRequest {
-    /// What the examples are for.
+pub struct JobOptions {
+    /// Kind of the database.
     pub kind: DatabaseKind,
-    /// How many, if not what the scene says.
+    /// Number of examples; `None`: the scene's.
     pub examples: Option<u32>,
-    /// Seed, if not what the scene says.
+    /// Seed; `None`: the scene's.
     pub seed: Option<u64>,
-    /// Threads.
+    /// Number of threads.
     pub threads: u32,
 }
 
-/// Why there is no folder.
+/// Why the folder cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
     /// The folder cannot be used.
     #[error(transparent)]
     Training(#[from] TrainingError),
-    /// A file cannot be put there.
+    /// A file cannot be written there.
     #[error("{path}: {source}", path = path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
 }
 
-/// Makes `root` the folder of a job on `config`, or opens it if it is that already.
+/// Makes `root` the folder of a job on `config`, or opens the folder of that job.
 ///
 /// # Errors
 /// See [`FolderError`].
-pub fn make(root: &Path, config: &Config, request: &JobRequest) -> Result<(TrainingFolder, TrainingJob), FolderError> {
+pub fn make(root: &Path, config: &Config, options: &JobOptions) -> Result<(TrainingFolder, TrainingJob), FolderError> {
     let folder = TrainingFolder::open(root)?;
     folder.paths().sweep(Writer::Submitter).map_err(|source| FolderError::Io { path: root.to_owned(), source })?;
-    let id = format!("{}-{}", config.name(), request.kind.name());
+    let id = format!("{}-{}", config.name(), options.kind.name());
     let job = TrainingJob {
         client_id: id.clone(),
         id,
-        kind: request.kind,
+        kind: options.kind,
         scene_name: config.name().to_owned(),
-        examples: request.examples,
-        seed: request.seed,
-        threads: Some(request.threads),
+        examples: options.examples,
+        seed: options.seed,
+        threads: Some(options.threads),
         submitted_unix_s: now_unix_s(),
     };
     folder.set_job(&job)?;
@@ -69,8 +69,8 @@ pub fn make(root: &Path, config: &Config, request: &JobRequest) -> Result<(Train
     Ok((folder, job))
 }
 
-/// Copies a file beside the scene, under the path that the scene names; one that is not below the scene is named by its
-/// absolute path instead.
+/// Copies a file into the folder, under the path in the scene. A file outside of the scene's folder stays where it is, and
+/// `text` gets its absolute path.
 fn bring(root: &Path, file: &SceneFile, text: String) -> Result<String, FolderError> {
     let at = |path: &Path| {
         let path = path.to_owned();
@@ -91,21 +91,21 @@ fn bring(root: &Path, file: &SceneFile, text: String) -> Result<String, FolderEr
     Ok(text.replace(&format!("\"{}\"", file.typed), &format!("\"{}\"", absolute.display())))
 }
 
-/// Notes that this process works on the job.
-pub fn begin(root: &Path) -> std::io::Result<Standing> {
-    let standing = Standing {
+/// Writes that this process runs the job.
+pub fn begin(root: &Path) -> std::io::Result<StoredStatus> {
+    let status = StoredStatus {
         state: JobState::Running,
         reason: None,
         started_unix_s: Some(now_unix_s()),
         finished_unix_s: None,
         pid: Some(std::process::id()),
     };
-    write(root, &standing)?;
-    Ok(standing)
+    write(root, &status)?;
+    Ok(status)
 }
 
-/// Notes how it ended, and why.
-pub fn end(root: &Path, begun: Standing, result: &anyhow::Result<TrainingReport>) -> std::io::Result<()> {
+/// Writes the final state of the job and its reason.
+pub fn end(root: &Path, started: StoredStatus, result: &anyhow::Result<TrainingReport>) -> std::io::Result<()> {
     let (state, reason) = match result {
         Ok(_) => (JobState::Done, None),
         Err(error) => match error.downcast_ref() {
@@ -113,9 +113,9 @@ pub fn end(root: &Path, begun: Standing, result: &anyhow::Result<TrainingReport>
             _ => (JobState::Failed, Some(format!("{error:#}"))),
         },
     };
-    write(root, &Standing { state, reason, finished_unix_s: Some(now_unix_s()), pid: None, ..begun })
+    write(root, &StoredStatus { state, reason, finished_unix_s: Some(now_unix_s()), pid: None, ..started })
 }
 
-fn write(root: &Path, standing: &Standing) -> std::io::Result<()> {
-    JobFolder::new(root.to_owned()).write_standing(standing)
+fn write(root: &Path, status: &StoredStatus) -> std::io::Result<()> {
+    JobFolder::new(root.to_owned()).write_status(status)
 }

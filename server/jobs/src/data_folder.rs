@@ -1,4 +1,4 @@
-//! The folder that a daemon keeps between its runs, and the lock that makes it one daemon's.
+//! Data folder of a daemon, locked so that no other daemon uses it.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, Write};
@@ -7,39 +7,39 @@ use std::path::{Path, PathBuf};
 use plica_training::now_unix_s;
 use serde::{Deserialize, Serialize};
 
-/// Why a data folder is not used.
+/// Why a data folder cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum DataFolderError {
-    /// Another daemon has it: this one must not start.
+    /// Locked by another daemon; this one must not start.
     #[error(
         "the data folder {folder} is in use by another plicad{owner}; stop that one, or choose another folder with --data"
     )]
     Locked {
         /// The folder.
         folder: String,
-        /// Process and session, as far as they are known.
+        /// Process and session, if known.
         owner: String,
     },
-    /// It cannot be read or written: a daemon simulates without it, and takes no jobs.
+    /// Not readable or not writable; the daemon simulates, and accepts no jobs.
     #[error(
         "the data folder {folder} cannot be used: {problem}; make it writable, or choose another folder with --data"
     )]
     Unusable {
         /// The folder.
         folder: String,
-        /// What the operating system said.
+        /// Error of the operating system.
         problem: String,
     },
 }
 
-/// A locked data folder. The lock ends with the value, or with the process, however that ends.
+/// A locked data folder. The lock is released with the value, or when the process ends in any way.
 #[derive(Debug)]
 pub struct DataFolder {
     path: PathBuf,
     _lock: File,
 }
 
-/// What the lock file says, for people and for the message of a second daemon.
+/// Content of the lock file: for people, and for the error message of a second daemon.
 #[derive(Debug, Serialize, Deserialize)]
 struct Owner {
     pid: u32,
@@ -48,7 +48,7 @@ struct Owner {
 }
 
 impl DataFolder {
-    /// Makes the folder if need be, and locks it.
+    /// Locks the folder; makes it if it does not exist.
     pub fn open(path: &Path, session: &str) -> Result<Self, DataFolderError> {
         let folder = path.display().to_string();
         let unusable = |e: io::Error| DataFolderError::Unusable { folder: folder.clone(), problem: e.to_string() };
@@ -69,7 +69,7 @@ impl DataFolder {
         &self.path
     }
 
-    /// Where each job has a folder of its own.
+    /// Parent of the job folders.
     pub fn jobs(&self) -> PathBuf {
         self.path.join("jobs")
     }

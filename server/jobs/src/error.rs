@@ -9,49 +9,49 @@ pub enum JobError {
     /// The daemon has no data folder.
     #[error("this daemon takes no jobs: {0}")]
     Unavailable(String),
-    /// A job cannot be kept on disk.
+    /// A job cannot be written to disk.
     #[error("the job cannot be stored: {0}")]
     Disk(String),
-    /// No such job.
+    /// No job has this id.
     #[error("no job `{0}`; `job_list` names them")]
     Unknown(String),
     /// Two different requests with one client id.
     #[error("client_id `{client_id}` belongs to job {id}, which asks for another {what}; choose a new client_id")]
     Conflict {
-        /// What both have.
+        /// Client id of both requests.
         client_id: String,
-        /// The job that is there.
+        /// Existing job.
         id: String,
         /// The first key that differs.
         what: &'static str,
     },
-    /// It is over.
+    /// The job has ended already.
     #[error("job {id} is {} already", .state.name())]
     Over {
         /// The job.
         id: String,
-        /// Where it stands.
+        /// Its state.
         state: JobState,
     },
-    /// It need not be resumed.
+    /// The job is queued, running or done.
     #[error("job {id} is {}; only failed, cancelled and paused jobs can be resumed", .state.name())]
     NotResumable {
         /// The job.
         id: String,
-        /// Where it stands.
+        /// Its state.
         state: JobState,
     },
-    /// There is no result.
+    /// The job has no result yet.
     #[error("job {id} is {}; its {} can be fetched when it is done", .state.name(), name_of(*.file))]
     NotDone {
         /// The job.
         id: String,
-        /// Where it stands.
+        /// Its state.
         state: JobState,
-        /// What was asked for.
+        /// Requested file.
         file: JobFile,
     },
-    /// Too many jobs are not over.
+    /// The queue is full.
     #[error("{0} jobs wait already; cancel some, or wait until some are over")]
     TooMany(usize),
     /// The scene cannot be used.

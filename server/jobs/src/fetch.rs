@@ -1,4 +1,4 @@
-//! Results in pieces, with the check-sum of the whole.
+//! Results in chunks, each with the checksum of the whole file.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -13,7 +13,7 @@ use sha2::{Digest, Sha256};
 
 use crate::error::JobError;
 
-/// Check-sums of files, each computed once.
+/// Checksums of files, computed once for each size and time of modification.
 #[derive(Debug, Default)]
 pub(crate) struct Sums(Mutex<HashMap<PathBuf, Sum>>);
 
@@ -25,7 +25,7 @@ struct Sum {
 }
 
 impl Sums {
-    /// The piece of a file from `offset` on.
+    /// Chunk of a file from `offset` on.
     pub(crate) fn piece(&self, path: &Path, offset: u64) -> Result<(ChunkHeader, Vec<u8>), ErrorReply> {
         let failed = |e: io::Error| JobError::Disk(format!("{} cannot be read: {e}", path.display()));
         let mut file = File::open(path).map_err(failed)?;

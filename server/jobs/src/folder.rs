@@ -1,4 +1,4 @@
-//! One job's folder: what was asked, where it stands, what came of it. All of it is text that a person can read.
+//! Folder of one job: request, status, log and results, in files that a person can read.
 //!
 //! The daemon writes `job.json`, `scene.toml` and `state.json`; the job's process writes everything else.
 
@@ -11,28 +11,28 @@ use plica_training::{JobPaths, TrainingJob, TrainingProgress, TrainingStage, wri
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-/// How much of the end of a log is looked at.
+/// Bytes that are read from the end of a log.
 const TAIL_BYTES: u64 = 4096;
-/// Longest last line that is repeated to clients, in characters.
+/// Characters of a log's last line that clients get at most.
 const LINE_CHARS: usize = 400;
 
-/// `state.json`: where the job stands.
+/// Status of a job as `state.json` stores it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Standing {
-    /// One of the states of the protocol.
+pub struct StoredStatus {
+    /// State, as in the protocol.
     pub state: JobState,
-    /// Why, in words.
+    /// Reason of the state, as a sentence.
     pub reason: Option<String>,
-    /// When the process was last started, in seconds since 1970.
+    /// Last start of the process \[s since 1970\].
     pub started_unix_s: Option<u64>,
-    /// When the job ended, in seconds since 1970.
+    /// End of the job \[s since 1970\].
     pub finished_unix_s: Option<u64>,
-    /// The process, while it runs.
+    /// Process id while it runs.
     pub pid: Option<u32>,
 }
 
-impl Standing {
-    /// A job that waits.
+impl StoredStatus {
+    /// Status of a waiting job.
     pub fn queued() -> Self {
         Self { state: JobState::Queued, reason: None, started_unix_s: None, finished_unix_s: None, pid: None }
     }
@@ -58,17 +58,17 @@ impl JobFolder {
         &self.0
     }
 
-    /// Where the scene is.
+    /// Path of the scene.
     pub fn scene(&self) -> PathBuf {
         self.0.scene()
     }
 
-    /// Where the process writes its log.
+    /// Path of the log of the process.
     pub fn log(&self) -> PathBuf {
         self.0.log()
     }
 
-    /// Where a result is, once the job is done.
+    /// Path of a result, which exists once the job is done.
     pub fn result(&self, file: JobFile) -> PathBuf {
         match file {
             JobFile::Database => self.0.database(),
@@ -87,17 +87,17 @@ impl JobFolder {
     }
 
     /// Reads `state.json`; the error is a sentence.
-    pub fn standing(&self) -> Result<Standing, String> {
+    pub fn status(&self) -> Result<StoredStatus, String> {
         read_json(&self.0.state())
     }
 
     /// Writes `state.json`.
-    pub fn write_standing(&self, standing: &Standing) -> io::Result<()> {
-        write_json_atomically(&self.0.state(), standing)
+    pub fn write_status(&self, status: &StoredStatus) -> io::Result<()> {
+        write_json_atomically(&self.0.state(), status)
     }
 
-    /// What `progress.json` says; `None` before there is one. A process that begins anew says that nothing is finished
-    /// until it has read what is there: then the examples on disk are counted.
+    /// Content of `progress.json`; `None` before it exists. A restarted process reports no example until it has read those on
+    /// disk, so in its first stage the files are counted instead.
     pub fn progress(&self) -> Option<TrainingProgress> {
         let progress: TrainingProgress = read_json(&self.0.progress()).ok()?;
         if progress.stage != TrainingStage::Interactions {
@@ -107,14 +107,14 @@ impl JobFolder {
         Some(TrainingProgress { done, rejected, ..progress })
     }
 
-    /// Whether a process works in it, one started by hand or one that is still ending: it holds a lock.
+    /// Whether a process holds the folder's lock: one started by hand, or one that is still ending.
     pub fn is_busy(&self) -> bool {
         let lock = fs::File::open(self.0.lock());
         lock.is_ok_and(|lock| matches!(lock.try_lock(), Err(fs::TryLockError::WouldBlock)))
     }
 
-    /// The last line of the log that says something.
-    pub fn last_words(&self) -> Option<String> {
+    /// Last line of the log that is not blank.
+    pub fn last_log_line(&self) -> Option<String> {
         let mut file = fs::File::open(self.log()).ok()?;
         let length = file.seek(SeekFrom::End(0)).ok()?;
         file.seek(SeekFrom::Start(length.saturating_sub(TAIL_BYTES))).ok()?;
@@ -143,7 +143,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_last_line_is_the_last_that_says_something() {
+    fn the_last_line_is_the_last_one_that_is_not_blank() {
         assert_eq!(last_line("one\nplicad: two \n\n  \n").as_deref(), Some("two"));
         assert_eq!(last_line("\u{1b}[31mred\n").as_deref(), Some("[31mred"));
         assert_eq!(last_line("\n \n"), None);
@@ -154,12 +154,12 @@ mod tests {
     fn files_have_the_keys_of_the_page() {
         let folder = tempfile::tempdir().unwrap();
         let job = JobFolder::new(folder.path().to_owned());
-        job.write_standing(&Standing::queued()).unwrap();
+        job.write_status(&StoredStatus::queued()).unwrap();
         let text = fs::read_to_string(job.paths().state()).unwrap();
         let json: serde_json::Value = serde_json::from_str(&text).unwrap();
         let keys: Vec<_> = json.as_object().unwrap().keys().map(String::as_str).collect();
         assert_eq!(keys, ["finished_unix_s", "pid", "reason", "started_unix_s", "state"]);
-        assert_eq!(job.standing().unwrap(), Standing::queued());
+        assert_eq!(job.status().unwrap(), StoredStatus::queued());
         let progress = r#"{"stage": "examples", "done": 3, "rejected": 1, "total": 8, "seconds_left": null}"#;
         fs::write(job.paths().progress(), progress).unwrap();
         let progress = job.progress().unwrap();
@@ -173,7 +173,7 @@ mod tests {
         let progress = job.progress().unwrap();
         assert_eq!((progress.done, progress.rejected, progress.total), (2, 1, 8), "what is on disk");
         assert!(job.job().unwrap_err().contains("job.json cannot be read"));
-        assert_eq!(job.last_words(), None);
+        assert_eq!(job.last_log_line(), None);
     }
 
     #[test]

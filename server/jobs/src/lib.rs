@@ -1,7 +1,7 @@
 //! Jobs: long-running work in processes of their own, queued, supervised and kept on disk.
 //!
-//! [`Jobs`] answers questions and takes requests from any thread; one thread of [`Supervision`] runs the processes. The
-//! simulation thread knows nothing of either.
+//! [`Jobs`] answers requests from any thread; one thread of [`Supervision`] runs the processes. The simulation thread uses
+//! neither.
 
 pub mod by_hand;
 mod data_folder;
@@ -32,7 +32,7 @@ use plica_training::now_unix_s;
 
 pub use data_folder::{DataFolder, DataFolderError, default_path};
 pub use error::JobError;
-pub use folder::{JobFolder, Standing};
+pub use folder::{JobFolder, StoredStatus};
 pub use priority::{Priority, lower};
 pub use process::Launch;
 pub use scene::ServedScene;
@@ -41,7 +41,7 @@ use fetch::Sums;
 use store::Store;
 use supervisor::Supervisor;
 
-/// All jobs of a daemon, or why it has none. Cheap to clone.
+/// All jobs of a daemon, or the reason why it accepts none. Cheap to clone.
 #[derive(Debug, Clone)]
 pub struct Jobs(Result<Arc<Shared>, String>);
 
@@ -51,11 +51,11 @@ struct Shared {
     sums: Sums,
     served: ServedScene,
     supervisor: std::thread::Thread,
-    /// One submission at a time: they share a folder until they are complete.
+    /// Held during a submission: incomplete ones share a folder.
     submitting: Mutex<()>,
 }
 
-/// The thread that runs jobs. Dropped, it stops the running one, which goes on when the next daemon starts.
+/// Handle of the thread that runs jobs. On drop the running job is paused; the next daemon continues it.
 #[derive(Debug)]
 pub struct Supervision {
     stop: Arc<AtomicBool>,
@@ -64,12 +64,12 @@ pub struct Supervision {
 }
 
 impl Jobs {
-    /// A daemon without jobs; `reason` is told to whoever asks for one.
+    /// Jobs of a daemon that accepts none; requests are refused with `reason`.
     pub fn unavailable(reason: impl Into<String>) -> Self {
         Self(Err(reason.into()))
     }
 
-    /// Reads what the folder holds and starts to work on it.
+    /// Reads the jobs of `folder` and starts the thread that runs them.
     pub fn start(folder: DataFolder, served: ServedScene, launch: Launch) -> std::io::Result<(Self, Supervision)> {
         let store = Arc::new(recover::recover(&folder.jobs())?);
         let stop = Arc::new(AtomicBool::new(false));
@@ -81,7 +81,7 @@ impl Jobs {
         Ok((Self(Ok(Arc::new(shared))), supervision))
     }
 
-    /// Why there are no jobs.
+    /// Why this daemon accepts no jobs.
     pub fn why_unavailable(&self) -> Option<&str> {
         self.0.as_ref().err().map(String::as_str)
     }
@@ -107,47 +107,48 @@ impl Jobs {
         shared.job(shared.store.find(id)?)
     }
 
-    /// Ends a job: at once in name, a moment later in fact.
+    /// Marks a job cancelled; its process ends within the grace period.
     pub fn cancel(&self, id: &str) -> Result<Job, JobError> {
-        self.decide(id, |standing| {
-            if standing.state.is_over() {
-                return Err(JobError::Over { id: id.to_owned(), state: standing.state });
+        self.change_status(id, |status| {
+            if status.state.is_over() {
+                return Err(JobError::Over { id: id.to_owned(), state: status.state });
             }
-            let (started_unix_s, finished_unix_s) = (standing.started_unix_s, Some(now_unix_s()));
-            *standing = Standing { state: JobState::Cancelled, started_unix_s, finished_unix_s, ..Standing::queued() };
+            let (started_unix_s, finished_unix_s) = (status.started_unix_s, Some(now_unix_s()));
+            *status =
+                StoredStatus { state: JobState::Cancelled, started_unix_s, finished_unix_s, ..StoredStatus::queued() };
             Ok(())
         })
     }
 
-    /// Queues a job again that ended without a result.
+    /// Queues a job that is failed, cancelled or paused again.
     pub fn resume(&self, id: &str) -> Result<Job, JobError> {
-        self.decide(id, |standing| match standing.state {
+        self.change_status(id, |status| match status.state {
             JobState::Failed | JobState::Cancelled | JobState::Paused => {
-                *standing = Standing { started_unix_s: standing.started_unix_s, ..Standing::queued() };
+                *status = StoredStatus { started_unix_s: status.started_unix_s, ..StoredStatus::queued() };
                 Ok(())
             }
             state => Err(JobError::NotResumable { id: id.to_owned(), state }),
         })
     }
 
-    /// A piece of a result.
+    /// Chunk of a result.
     pub fn piece(&self, request: &JobFetchRequest, offset: u64) -> Result<(ChunkHeader, Vec<u8>), ErrorReply> {
         let path = self.result(&request.id, request.file)?;
         self.shared()?.sums.piece(&path, offset)
     }
 
-    /// Where a result of a job that is done lies.
+    /// Path of a result of a finished job.
     pub fn result(&self, id: &str, file: JobFile) -> Result<PathBuf, JobError> {
         let store = &self.shared()?.store;
         let entry = store.entry(store.find(id)?).ok_or_else(|| JobError::Unknown(id.to_owned()))?;
-        let state = entry.standing.state;
+        let state = entry.status.state;
         if state != JobState::Done {
             return Err(JobError::NotDone { id: id.to_owned(), state, file });
         }
         Ok(entry.folder.result(file))
     }
 
-    /// Jobs that have changed since a version (0: ever), and the version now.
+    /// Present version of the table, and the jobs changed since `version` (0: all jobs).
     pub fn changed_since(&self, version: u64) -> (u64, Vec<Job>) {
         self.0.as_ref().map_or_else(|_| (version, Vec::new()), |shared| shared.store.changed_since(version))
     }
@@ -158,13 +159,17 @@ impl Jobs {
         self.0.as_ref().map_or_else(|_| Vec::new(), newest)
     }
 
-    /// Changes where a job stands and keeps it, if it can be kept.
-    fn decide(&self, id: &str, change: impl FnOnce(&mut Standing) -> Result<(), JobError>) -> Result<Job, JobError> {
+    /// Changes the status of a job and writes it; a failed write is logged and tried again later.
+    fn change_status(
+        &self,
+        id: &str,
+        change: impl FnOnce(&mut StoredStatus) -> Result<(), JobError>,
+    ) -> Result<Job, JobError> {
         let shared = self.shared()?;
         let number = shared.store.find(id)?;
         shared.store.change(number, change).unwrap_or_else(|| Err(JobError::Unknown(id.to_owned())))?;
         if let Err(e) = shared.store.save(number) {
-            tracing::warn!("the state of job {id} cannot be written and is kept in memory: {e}");
+            tracing::warn!("the state of job {id} cannot be written, it is kept in memory: {e}");
         }
         shared.supervisor.unpark();
         shared.job(number)
@@ -178,12 +183,12 @@ impl Jobs {
 impl Shared {
     fn job(&self, number: u32) -> Result<Job, JobError> {
         let entry = self.store.entry(number);
-        entry.map(|entry| entry.job()).ok_or_else(|| JobError::Unknown(number.to_string()))
+        entry.map(|entry| entry.view()).ok_or_else(|| JobError::Unknown(number.to_string()))
     }
 }
 
 impl Supervision {
-    /// Asks the running job to stop, and waits for nothing.
+    /// Asks the running job to stop, without waiting.
     pub fn begin_stop(&self) {
         self.stop.store(true, Relaxed);
         if let Some(thread) = &self.thread {
@@ -195,7 +200,7 @@ impl Supervision {
 impl Drop for Supervision {
     fn drop(&mut self) {
         self.begin_stop();
-        // A panic in the thread has been reported by itself.
+        // A panic of the thread has been logged already.
         let _ = self.thread.take().map(JoinHandle::join);
     }
 }

@@ -1,19 +1,19 @@
-//! How a job's process makes room for everything else. Run by the process itself, before it becomes the work.
+//! Lowers the priority of a job's process, in the process itself before it starts its work.
 
-/// How low jobs run.
+/// Scheduling class of jobs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Priority {
-    /// Only when a core has nothing else to do (`SCHED_IDLE`, nice 19).
+    /// Runs on otherwise idle cores (`SCHED_IDLE`, nice 19).
     #[default]
     Idle,
-    /// Little where others want the core too (`SCHED_BATCH`, nice 19).
+    /// Small share of a busy core (`SCHED_BATCH`, nice 19).
     Low,
-    /// Like any program.
+    /// Default class of the system.
     Normal,
 }
 
 impl Priority {
-    /// The name on the command line.
+    /// Name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Idle => "idle",
@@ -23,8 +23,11 @@ impl Priority {
     }
 }
 
-/// Lowers the calling process, keeps it off a core, and has it end with the thread that started it. What is refused
-/// comes back as sentences; the work goes on without. Fails if `parent`, the process that started it, is gone already.
+/// Lowers the calling process, keeps it off a core, and ties its life to the thread that started it. Returns refused requests
+/// as sentences; the process runs without them.
+///
+/// # Errors
+/// `parent`, the process that started this one, has ended already.
 pub fn lower(priority: Priority, avoid_cpu: Option<usize>, parent: u32) -> Result<Vec<String>, String> {
     let mut refused = Vec::new();
     let mut note = |what: &str, result: Result<(), String>| {
@@ -34,13 +37,16 @@ pub fn lower(priority: Priority, avoid_cpu: Option<usize>, parent: u32) -> Resul
     if os::parent() != Some(parent) {
         return Err("the daemon that started this job is gone".to_owned());
     }
-    note("not the first to go when memory runs out", os::offer_memory());
+    note(
+        "the memory score cannot be raised, so this job is not the first to end when memory runs out",
+        os::offer_memory(),
+    );
     if let Some(cpu) = avoid_cpu {
-        note("not kept off the simulation's core", os::avoid(cpu));
+        note("the simulation's core cannot be left", os::avoid(cpu));
     }
     if priority != Priority::Normal {
-        note("not niced", os::be_nice());
-        note("no lower scheduling class", os::schedule(priority));
+        note("nice 19 was refused", os::be_nice());
+        note("the lower scheduling class was refused", os::schedule(priority));
     }
     Ok(refused)
 }
@@ -52,7 +58,7 @@ mod os {
 
     use super::Priority;
 
-    /// SIGKILL: what is finished is on disk, and a process that hangs would not hear anything else.
+    /// SIGKILL, since a process that hangs ignores other signals; finished examples are on disk.
     pub(crate) fn end_with_parent() -> Result<(), String> {
         set_parent_process_death_signal(Some(Signal::KILL)).map_err(|e| e.to_string())
     }

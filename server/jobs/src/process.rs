@@ -1,8 +1,7 @@
-//! The process of one job.
+//! Process of one job.
 //!
-//! It is started through `plicad child`, which lowers itself and then becomes the process that does the work. Nothing
-//! is done between fork and exec: a fork would mark every page of the daemon for copying, and the simulation would
-//! pay for it, page by page.
+//! It is started through `plicad child`, which lowers its own priority and then executes the job. Nothing runs between fork and
+//! exec, since a fork marks every page of the daemon for copying, and the simulation thread would fault on each.
 
 use std::fs::OpenOptions;
 use std::io;
@@ -15,23 +14,23 @@ use rustix::process::{Pid, Signal, kill_process_group};
 use crate::folder::JobFolder;
 use crate::priority::Priority;
 
-/// How processes are started and ended.
+/// Options for starting and ending processes.
 #[derive(Debug, Clone)]
 pub struct Launch {
-    /// What runs as `PROGRAM train --job DIR`.
+    /// Program, run as `PROGRAM train --job DIR`.
     pub program: PathBuf,
-    /// The plicad whose `child` command lowers the process; `None` runs the program as it is.
+    /// plicad with the `child` command that lowers the process; `None` starts the program directly.
     pub launcher: Option<PathBuf>,
-    /// How low.
+    /// Scheduling class.
     pub priority: Priority,
-    /// Core that belongs to the simulation.
+    /// Core of the simulation, which jobs leave free.
     pub avoid_cpu: Option<usize>,
-    /// How long a process that was asked to stop may take.
+    /// Time between SIGTERM and SIGKILL.
     pub grace: Duration,
 }
 
 impl Launch {
-    /// This very program, lowered.
+    /// Starts the program of this process, lowered.
     pub fn own(priority: Priority, avoid_cpu: Option<usize>) -> io::Result<Self> {
         let program = std::env::current_exe()?;
         Ok(Self { launcher: Some(program.clone()), program, priority, avoid_cpu, grace: Duration::from_secs(2) })
@@ -53,13 +52,13 @@ impl Launch {
 #[derive(Debug)]
 pub(crate) struct Process {
     child: Child,
-    /// When it was asked to stop.
+    /// Time of SIGTERM, once it was sent.
     asked: Option<Instant>,
     grace: Duration,
 }
 
 impl Process {
-    /// Starts the process of a job, the leader of a process group; the error is a sentence.
+    /// Starts the process of a job as the leader of a process group; the error is a sentence.
     pub(crate) fn start(launch: &Launch, folder: &JobFolder) -> Result<Self, String> {
         let log = OpenOptions::new().append(true).create(true).open(folder.log());
         let log = log.map_err(|e| format!("{} cannot be written: {e}", folder.log().display()))?;
@@ -78,17 +77,17 @@ impl Process {
         self.child.id()
     }
 
-    /// Whether this daemon has asked it to stop.
+    /// Whether SIGTERM was sent.
     pub(crate) fn was_asked(&self) -> bool {
         self.asked.is_some()
     }
 
-    /// How it ended, once it has.
+    /// Exit status, once it has ended.
     pub(crate) fn ended(&mut self) -> io::Result<Option<ExitStatus>> {
         self.child.try_wait()
     }
 
-    /// Asks it to stop; called again after the grace, ends it.
+    /// Sends SIGTERM; SIGKILL if called again after the grace period.
     pub(crate) fn stop(&mut self) {
         match self.asked {
             None => {
@@ -100,15 +99,15 @@ impl Process {
         }
     }
 
-    /// True if it is still there long after it was ended: it hangs in the kernel, on a disk for instance.
+    /// Whether it runs on long after SIGKILL: it hangs in the kernel, for instance on a disk.
     pub(crate) fn is_stuck(&self) -> bool {
         self.asked.is_some_and(|asked| asked.elapsed() >= 2 * self.grace)
     }
 
-    /// A process that has not been waited for keeps its number, so this cannot reach another one.
+    /// Signals the process group. The id cannot belong to another process before this one was waited for.
     fn signal(&self, signal: Signal) {
         let group = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw);
-        // An error means that it has ended already.
+        // An error means that the group has ended already.
         let _ = group.map(|group| kill_process_group(group, signal));
     }
 }

@@ -1,4 +1,4 @@
-//! What a daemon finds in its data folder when it starts.
+//! Jobs in the data folder when a daemon starts.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -7,13 +7,13 @@ use std::path::Path;
 use plica_protocol::jobs::JobState;
 use plica_training::Writer;
 
-use crate::folder::{JobFolder, Standing};
+use crate::folder::{JobFolder, StoredStatus};
 use crate::store::{Entry, Found, Store};
 
-/// Folder of a job that is being submitted; what is in it when a daemon starts was never acknowledged.
+/// Folder of an incomplete submission; one that a daemon finds at its start was never acknowledged.
 pub(crate) const SUBMITTING: &str = ".submitting";
 
-/// Reads all jobs. Those that waited or ran when the last daemon ended, however it ended, are queued again.
+/// Reads all jobs. Jobs that were queued, running or paused are queued again, however the last daemon ended.
 pub(crate) fn recover(jobs: &Path) -> std::io::Result<Store> {
     if jobs.join(SUBMITTING).exists() {
         fs::remove_dir_all(jobs.join(SUBMITTING))?;
@@ -25,7 +25,7 @@ pub(crate) fn recover(jobs: &Path) -> std::io::Result<Store> {
         last_number = last_number.max(number);
         match read(&entry.path()) {
             Ok(job) => drop(found.insert(number, job)),
-            Err(problem) => tracing::warn!("{} is not taken for a job: {problem}", entry.path().display()),
+            Err(problem) => tracing::warn!("{} is not a job: {problem}", entry.path().display()),
         }
     }
     Ok(Store::new(jobs.to_owned(), found, last_number))
@@ -33,28 +33,28 @@ pub(crate) fn recover(jobs: &Path) -> std::io::Result<Store> {
 
 fn read(path: &Path) -> Result<Found, String> {
     let folder = JobFolder::new(path.to_owned());
-    let order = folder.job()?;
-    if path.file_name().is_none_or(|name| name != order.id.as_str()) {
-        return Err(format!("its job.json says that it is job {}", order.id));
+    let job = folder.job()?;
+    if path.file_name().is_none_or(|name| name != job.id.as_str()) {
+        return Err(format!("its job.json is that of job {}", job.id));
     }
     if let Err(problem) = folder.paths().sweep(Writer::Submitter) {
-        tracing::warn!("{}: leftovers cannot be removed: {problem}", path.display());
+        tracing::warn!("{}: unfinished files cannot be removed: {problem}", path.display());
     }
-    let written = folder.standing();
+    let written = folder.status();
     if let Err(problem) = &written {
         tracing::warn!("{problem}; the job is queued");
     }
-    let standing = written.clone().map_or_else(|_| Standing::queued(), resumed);
-    let changed = written.ok().as_ref() != Some(&standing);
+    let status = written.clone().map_or_else(|_| StoredStatus::queued(), resumed);
+    let changed = written.ok().as_ref() != Some(&status);
     let progress = folder.progress();
-    Ok(Found { entry: Entry { folder, order, standing, progress }, changed })
+    Ok(Found { entry: Entry { folder, job, status, progress }, changed })
 }
 
-fn resumed(standing: Standing) -> Standing {
-    match standing.state {
-        JobState::Done | JobState::Failed | JobState::Cancelled => standing,
+fn resumed(status: StoredStatus) -> StoredStatus {
+    match status.state {
+        JobState::Done | JobState::Failed | JobState::Cancelled => status,
         JobState::Queued | JobState::Running | JobState::Paused => {
-            Standing { started_unix_s: standing.started_unix_s, ..Standing::queued() }
+            StoredStatus { started_unix_s: status.started_unix_s, ..StoredStatus::queued() }
         }
     }
 }

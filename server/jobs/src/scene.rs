@@ -1,4 +1,4 @@
-//! The scene of a job: text, and the files that it names (meshes, recorded motions), checked before the job is taken.
+//! Scene of a job: text and the files that it names (meshes, recorded motions), checked before the job is accepted.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};
@@ -10,21 +10,21 @@ use plica_training::{JobPaths, write_atomically};
 
 use crate::error::JobError;
 
-/// Largest file that a job takes along.
+/// Largest file that is copied into a job's folder.
 const MAX_FILE_BYTES: u64 = 64 << 20;
 
-/// The scene that the daemon serves, as it was read.
+/// Scene that the daemon serves, as read from its file.
 #[derive(Debug, Clone)]
 pub struct ServedScene {
     /// Its name.
     pub name: String,
-    /// The folder that the files it names are taken from; none for the built-in scene.
+    /// Folder of the files that it names; `None` for the built-in scene.
     pub folder: Option<PathBuf>,
     /// Its text.
     pub text: String,
 }
 
-/// A checked scene and what belongs to it.
+/// A checked scene with its files.
 #[derive(Debug)]
 pub(crate) struct JobScene {
     pub(crate) name: String,
@@ -34,19 +34,19 @@ pub(crate) struct JobScene {
 }
 
 impl JobScene {
-    /// The scene of a request, or the served one.
+    /// Scene of a request, or the served one if the request has none.
     pub(crate) fn new(request: &JobSubmitRequest, served: &ServedScene) -> Result<Self, JobError> {
         let folder = served.folder.as_deref();
         let (name, text) = match &request.scene {
             Some(text) => (request.scene_name.as_deref().unwrap_or("scene"), text),
             None => (served.name.as_str(), &served.text),
         };
-        let files = take_files(text, folder, request.scene.is_none())?;
+        let files = read_files(text, folder, request.scene.is_none())?;
         check(name, text, folder)?;
         Ok(Self { name: name.to_owned(), text: text.clone(), files })
     }
 
-    /// Writes `scene.toml` and what it names into a job's folder.
+    /// Writes `scene.toml` and the files that it names into a job's folder.
     pub(crate) fn write(&self, paths: &JobPaths) -> std::io::Result<()> {
         write_atomically(&paths.scene(), self.text.as_bytes())?;
         for (path, bytes) in &self.files {
@@ -58,7 +58,7 @@ impl JobScene {
     }
 }
 
-/// What the scene file's own errors say, without the daemon's folders.
+/// Checks the scene; errors name the file without the daemon's folders.
 fn check(name: &str, text: &str, folder: Option<&Path>) -> Result<(), JobError> {
     let file = PathBuf::from(format!("{name}.toml"));
     match Config::parse(&folder.unwrap_or(Path::new("")).join(&file), text) {
@@ -70,11 +70,12 @@ fn check(name: &str, text: &str, folder: Option<&Path>) -> Result<(), JobError> 
     }
 }
 
-/// Reads the files that a scene names, before anything else does: they are small, ordinary, and where they may be.
+/// Reads the files that a scene names, and refuses files that are large, not ordinary, or outside of `folder`. Runs before
+/// anything else opens them.
 ///
-/// The daemon's own scene may name others by absolute paths; they stay where they are.
-fn take_files(text: &str, folder: Option<&Path>, own: bool) -> Result<Vec<(PathBuf, Vec<u8>)>, JobError> {
-    // Text that is no scene is refused a moment later, with the line.
+/// The daemon's own scene may name files by absolute paths; they are not copied.
+fn read_files(text: &str, folder: Option<&Path>, own: bool) -> Result<Vec<(PathBuf, Vec<u8>)>, JobError> {
+    // Text that is not a scene is refused by `check`, with the line.
     let named = named_files(Path::new("scene.toml"), text).into_iter().map(|file| file.typed);
     let wanted = named.filter(|name| !(own && Path::new(name).is_absolute()));
     wanted.map(|name| read_file(&name, folder).map(|bytes| (PathBuf::from(name), bytes))).collect()
@@ -83,19 +84,21 @@ fn take_files(text: &str, folder: Option<&Path>, own: bool) -> Result<Vec<(PathB
 fn read_file(name: &str, folder: Option<&Path>) -> Result<Vec<u8>, JobError> {
     let refuse = |why: &str| Err(JobError::Scene(format!("file = \"{name}\": {why}")));
     if !is_plain(name) {
-        return refuse("the files of a job's scene lie beside the served scene or below it");
+        return refuse("files of a job's scene must lie beside the served scene or below it");
     }
-    let Some(folder) = folder else { return refuse("the built-in scene is served, and there are no files beside it") };
+    let Some(folder) = folder else {
+        return refuse("the built-in scene is served, which has no folder to take files from");
+    };
     let path = folder.join(name);
     match fs::metadata(&path) {
-        Ok(file) if !file.is_file() => refuse("it is no ordinary file"),
+        Ok(file) if !file.is_file() => refuse("it is not an ordinary file"),
         Ok(file) if file.len() > MAX_FILE_BYTES => refuse("it is larger than 64 MiB"),
         Ok(_) => fs::read(&path).or_else(|e| refuse(&format!("it cannot be read: {e}"))),
         Err(e) => refuse(&format!("it cannot be read beside the served scene: {e}")),
     }
 }
 
-/// Whether a path leads down only, and to none of a job's own files.
+/// Whether a path stays below its folder and does not collide with a job's own files.
 fn is_plain(name: &str) -> bool {
     let mut parts = Path::new(name).components();
     let down = !name.is_empty() && parts.clone().all(|part| matches!(part, Component::Normal(_)));
@@ -130,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn files_come_along() {
+    fn files_are_copied() {
         let (folder, job) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let served = served(folder.path());
         let scene = JobScene::new(&JobSubmitRequest::new("a", JobKind::Training), &served).unwrap();

@@ -1,7 +1,7 @@
-//! The thread that runs jobs, one at a time, each as a process. It alone starts, ends and waits for processes; what it
-//! is to do stands in the store.
+//! Thread that runs jobs, one at a time, each as a process. No other thread starts, ends or waits for processes; the queue is
+//! the store's.
 //!
-//! A process ends with the thread that started it, so this thread lives as long as the daemon: a panic inside a step is
+//! A process ends with the thread that started it, so this thread must live as long as the daemon: panics inside a step are
 //! caught.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -13,22 +13,22 @@ use std::time::{Duration, Instant};
 use plica_protocol::jobs::{JobFile, JobState};
 use plica_training::now_unix_s;
 
-use crate::folder::{JobFolder, Standing};
+use crate::folder::{JobFolder, StoredStatus};
 use crate::process::{Launch, Process};
 use crate::reason::reason;
 use crate::store::Store;
 
-/// How often the process and its progress are looked at.
+/// Interval between checks of the process and its progress.
 const PERIOD: Duration = Duration::from_millis(200);
-/// How often what could not be written is tried again.
+/// Interval between attempts to write states that could not be written.
 const SAVE_PERIOD: Duration = Duration::from_secs(2);
 
-/// The state of the thread.
+/// State of the thread.
 pub(crate) struct Supervisor {
     store: Arc<Store>,
     launch: Launch,
     stop: Arc<AtomicBool>,
-    /// The process, and the number of its job.
+    /// Number of the running job, and its process.
     running: Option<(u32, Process)>,
 }
 
@@ -37,7 +37,7 @@ impl Supervisor {
         Self { store, launch, stop, running: None }
     }
 
-    /// Runs until it is told to stop and no process is left.
+    /// Runs until a stop is requested and no process is left.
     pub(crate) fn run(mut self) {
         let mut save_due = Instant::now();
         loop {
@@ -68,33 +68,33 @@ impl Supervisor {
 
     fn start(&mut self, number: u32) {
         let Some(entry) = self.store.entry(number) else { return };
-        let started = self.store.change(number, |standing| {
-            let queued = standing.state == JobState::Queued;
-            if queued {
+        let started = self.store.change(number, |status| {
+            let is_queued = status.state == JobState::Queued;
+            if is_queued {
                 let started_unix_s = Some(now_unix_s());
-                *standing = Standing { state: JobState::Running, started_unix_s, ..Standing::queued() };
+                *status = StoredStatus { state: JobState::Running, started_unix_s, ..StoredStatus::queued() };
             }
-            queued
+            is_queued
         });
         if started != Some(true) {
             return;
         }
         match self.launch(number, &entry.folder) {
             Ok(process) => {
-                tracing::info!("job {} runs as process {}", entry.order.id, process.id());
+                tracing::info!("job {} runs as process {}", entry.job.id, process.id());
                 self.running = Some((number, process));
             }
             Err(problem) => self.fail(number, problem),
         }
     }
 
-    /// The state is on disk before the process is there, so that a folder that cannot be written is noticed first.
+    /// Writes the state before the process starts, so that a folder that cannot be written is noticed first.
     fn launch(&self, number: u32, folder: &JobFolder) -> Result<Process, String> {
         let unwritable = |e| format!("{} cannot be written: {e}", folder.path().display());
         self.store.save(number).map_err(unwritable)?;
         let process = Process::start(&self.launch, folder)?;
-        self.store.change(number, |standing| standing.pid = Some(process.id()));
-        // The number of the process is for people; the job runs without it, too.
+        self.store.change(number, |status| status.pid = Some(process.id()));
+        // The process id is for people; the job also runs without it.
         let _ = self.store.save(number);
         Ok(process)
     }
@@ -105,16 +105,16 @@ impl Supervisor {
         let number = *number;
         let ended = process.ended();
         if let Some(progress) = self.store.entry(number).and_then(|entry| entry.folder.progress()) {
-            self.store.tell(number, progress);
+            self.store.set_progress(number, progress);
         }
         match ended {
             Ok(None) if stopping || process.was_asked() || self.store.state(number) != Some(JobState::Running) => {
                 process.stop();
             }
             Ok(None) => {}
-            Ok(Some(status)) => {
+            Ok(Some(exit)) => {
                 self.running = None;
-                self.finish(number, status);
+                self.finish(number, exit);
             }
             Err(e) => {
                 self.running = None;
@@ -123,51 +123,52 @@ impl Supervisor {
         }
     }
 
-    /// Somebody may have cancelled the job, or queued it again, while its process was ending: then that stands.
-    fn finish(&self, number: u32, status: ExitStatus) {
+    /// Writes the final state, unless the job was cancelled or queued again while its process was ending.
+    fn finish(&self, number: u32, exit: ExitStatus) {
         let Some(entry) = self.store.entry(number) else { return };
-        let (state, reason) = self.verdict(status, &entry.folder);
-        self.store.change(number, |standing| {
-            if standing.state == JobState::Running {
+        let (state, reason) = self.final_state(exit, &entry.folder);
+        self.store.change(number, |status| {
+            if status.state == JobState::Running {
                 let (reason, finished_unix_s) = (reason.clone(), state.is_over().then(now_unix_s));
-                *standing = Standing { state, reason, finished_unix_s, pid: None, ..standing.clone() };
+                *status = StoredStatus { state, reason, finished_unix_s, pid: None, ..status.clone() };
             }
         });
         if let Some(now) = self.store.entry(number) {
-            let reason = now.standing.reason.map_or_else(String::new, |reason| format!(": {reason}"));
-            tracing::info!("job {} is {}{reason}", now.order.id, now.standing.state.name());
+            let reason = now.status.reason.map_or_else(String::new, |reason| format!(": {reason}"));
+            tracing::info!("job {} is {}{reason}", now.job.id, now.status.state.name());
         }
         self.save(number);
     }
 
-    fn verdict(&self, status: ExitStatus, folder: &JobFolder) -> (JobState, Option<String>) {
-        if status.success() {
+    /// State and reason of a job whose process has ended.
+    fn final_state(&self, exit: ExitStatus, folder: &JobFolder) -> (JobState, Option<String>) {
+        if exit.success() {
             let files = [JobFile::Database, JobFile::Report].map(|file| folder.result(file));
             return match files.iter().find(|file| !file.is_file()) {
                 None => (JobState::Done, None),
                 Some(file) => {
-                    (JobState::Failed, Some(format!("it ended without a result: {} is not there", file.display())))
+                    (JobState::Failed, Some(format!("it ended without a result: {} is missing", file.display())))
                 }
             };
         }
         if self.stopping() {
             return (JobState::Paused, Some("the daemon was stopped".to_owned()));
         }
-        (JobState::Failed, Some(reason(status, folder.last_words().as_deref(), folder.path())))
+        (JobState::Failed, Some(reason(exit, folder.last_log_line().as_deref(), folder.path())))
     }
 
     fn fail(&self, number: u32, problem: String) {
         tracing::warn!("job {number:04} has failed: {problem}");
-        self.store.change(number, |standing| {
+        self.store.change(number, |status| {
             let (state, finished_unix_s) = (JobState::Failed, Some(now_unix_s()));
-            *standing = Standing { state, reason: Some(problem), finished_unix_s, pid: None, ..standing.clone() };
+            *status = StoredStatus { state, reason: Some(problem), finished_unix_s, pid: None, ..status.clone() };
         });
         self.save(number);
     }
 
     fn save(&self, number: u32) {
         if let Err(e) = self.store.save(number) {
-            tracing::warn!("the state of job {number:04} cannot be written and is kept in memory: {e}");
+            tracing::warn!("the state of job {number:04} cannot be written, it is kept in memory: {e}");
         }
     }
 

@@ -1,11 +1,11 @@
 //! Jobs as clients see them.
 
-use plica_protocol::jobs::{Job, JobKind, Progress};
+use plica_protocol::jobs::{Job, JobKind, JobProgress};
 use plica_training::TrainingStage;
 
-use crate::folder::Standing;
+use crate::folder::StoredStatus;
 
-/// What a job makes.
+/// Kind of the database that a job makes.
 pub(crate) fn training_kind(kind: JobKind) -> plica_training::DatabaseKind {
     match kind {
         JobKind::Training => plica_training::DatabaseKind::Training,
@@ -13,38 +13,38 @@ pub(crate) fn training_kind(kind: JobKind) -> plica_training::DatabaseKind {
     }
 }
 
-/// A job: what was asked, where it stands, what its process has said.
+/// Job of the protocol, from request, status and progress.
 pub(crate) fn job(
-    order: &plica_training::TrainingJob,
-    standing: &Standing,
+    job: &plica_training::TrainingJob,
+    status: &StoredStatus,
     progress: Option<plica_training::TrainingProgress>,
 ) -> Job {
     Job {
-        id: order.id.clone(),
-        client_id: order.client_id.clone(),
-        kind: match order.kind {
+        id: job.id.clone(),
+        client_id: job.client_id.clone(),
+        kind: match job.kind {
             plica_training::DatabaseKind::Training => JobKind::Training,
             plica_training::DatabaseKind::Evaluation => JobKind::Evaluation,
         },
-        scene_name: order.scene_name.clone(),
-        examples: order.examples,
-        seed: order.seed,
-        threads: order.threads.unwrap_or(1),
-        submitted_unix_s: order.submitted_unix_s,
-        state: standing.state,
-        reason: standing.reason.clone(),
-        started_unix_s: standing.started_unix_s,
-        finished_unix_s: standing.finished_unix_s,
+        scene_name: job.scene_name.clone(),
+        examples: job.examples,
+        seed: job.seed,
+        threads: job.threads.unwrap_or(1),
+        submitted_unix_s: job.submitted_unix_s,
+        state: status.state,
+        reason: status.reason.clone(),
+        started_unix_s: status.started_unix_s,
+        finished_unix_s: status.finished_unix_s,
         progress: progress.map(job_progress).unwrap_or_default(),
     }
 }
 
-fn job_progress(progress: plica_training::TrainingProgress) -> Progress {
+fn job_progress(progress: plica_training::TrainingProgress) -> JobProgress {
     let plica_training::TrainingProgress { stage, done, rejected, total, seconds_left } = progress;
     let stage = match stage {
         TrainingStage::Interactions => "interactions",
         TrainingStage::Examples => "examples",
         TrainingStage::Database => "database",
     };
-    Progress { stage: Some(stage.to_owned()), done, rejected, total, seconds_left }
+    JobProgress { stage: Some(stage.to_owned()), done, rejected, total, seconds_left }
 }

@@ -12,10 +12,10 @@ use plica_protocol::{DEFAULT_ENDPOINT, DEFAULT_SESSION};
 #[derive(Debug, Parser)]
 #[command(name = "plicad", version, about, max_term_width = 110)]
 pub struct Cli {
-    /// What to do.
+    /// Command.
     #[command(subcommand)]
     pub command: Command,
-    /// Says more on standard error; twice: everything.
+    /// Prints more on standard error; twice: everything.
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
     pub verbose: u8,
     /// Prints one JSON object as the last line of standard output.
@@ -23,7 +23,7 @@ pub struct Cli {
     pub json: bool,
 }
 
-/// What plicad can do.
+/// Commands of plicad.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Runs a scene in real time and serves it on the bus until Ctrl-C.
@@ -34,24 +34,24 @@ pub enum Command {
     Simulate(SimulateArgs),
     /// Times the tick, stage by stage, beside the memory limit measured in the same run.
     Bench(BenchArgs),
-    /// Says what a scene will cost, and whether it can be served.
+    /// Estimates the cost of a scene and checks that it can be served.
     Check(CheckArgs),
-    /// Makes examples of a scene: the tool interacts, both models settle, what the coarse one misses is kept.
+    /// Makes examples for a scene: solves interactions with both models and stores the difference of their skins.
     Train(TrainArgs),
-    /// Judges every way to enrich by held-out accurate solutions: errors, time, degenerate inputs.
+    /// Evaluates enrichment methods on held-out accurate solutions: errors, time, degenerate inputs.
     Evaluate(EvaluateArgs),
     /// Charts speed against accuracy, one point per configuration, as SVG and JSON.
     Chart(ChartArgs),
     /// Prints the JSON Schema of scene files.
     Schema,
-    /// Solves a case accurately: a mesh, its materials, supports and loads; prints what its probes tell.
+    /// Solves a case with the accurate model: mesh, materials, supports and loads; prints the readings of its probes.
     Solve(SolveArgs),
     /// Becomes the process of a job.
     #[command(hide = true)]
     Child(ChildArgs),
 }
 
-/// Where the daemon is found.
+/// Endpoint and session of the daemon.
 #[derive(Debug, Args)]
 pub struct BusArgs {
     /// Zenoh endpoint to listen on.
@@ -66,7 +66,7 @@ pub struct BusArgs {
 }
 
 impl BusArgs {
-    /// The same as options of the bus.
+    /// Converts to options of the bus.
     pub fn options(&self) -> BusOptions {
         BusOptions {
             listen: self.listen.clone(),
@@ -79,34 +79,34 @@ impl BusArgs {
 /// `plicad serve`.
 #[derive(Debug, Args)]
 pub struct ServeArgs {
-    /// Scene file; left out: the built-in wedge.
+    /// Scene file [default: the built-in wedge].
     pub scene: Option<PathBuf>,
-    /// Where the daemon is found.
+    /// Endpoint and session of the daemon.
     #[command(flatten)]
     pub bus: BusArgs,
-    /// Ticks only when rpc/step says so.
+    /// Runs ticks only on rpc/step.
     #[arg(long)]
     pub lock_step: bool,
-    /// Examples to enrich the skin with, in place of those that the scene names.
+    /// Database for enrichment, in place of the scene's.
     #[arg(long, value_name = "FILE")]
     pub database: Option<PathBuf>,
     /// Folder for jobs and their results; one daemon at a time uses it.
     #[arg(long, value_name = "DIR", help = DATA_HELP)]
     pub data: Option<PathBuf>,
-    /// How much of the machine jobs may take from others.
+    /// Scheduling class of jobs.
     #[arg(long, value_enum, default_value_t, value_name = "CLASS")]
     pub job_priority: JobPriority,
 }
 
-/// How low jobs run.
+/// Scheduling class of jobs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum JobPriority {
-    /// Only when a core has nothing else to do (`SCHED_IDLE`, nice 19).
+    /// Runs on otherwise idle cores (`SCHED_IDLE`, nice 19).
     #[default]
     Idle,
-    /// Little where others want the core too (`SCHED_BATCH`, nice 19).
+    /// Small share of a busy core (`SCHED_BATCH`, nice 19).
     Low,
-    /// Like any program.
+    /// Default class of the system.
     Normal,
 }
 
@@ -126,16 +126,16 @@ const DATA_HELP: &str =
 /// `plicad child`.
 #[derive(Debug, Args)]
 pub struct ChildArgs {
-    /// Process that starts it; without that one it ends.
+    /// Process id of the daemon; the child ends without it.
     #[arg(long)]
     pub parent: u32,
-    /// How low it runs.
+    /// Scheduling class.
     #[arg(long, value_enum)]
     pub priority: JobPriority,
-    /// Core that it keeps off.
+    /// Core to leave free.
     #[arg(long)]
     pub avoid_cpu: Option<usize>,
-    /// What it becomes.
+    /// Command to execute.
     #[arg(last = true, required = true)]
     pub command: Vec<OsString>,
 }
@@ -151,16 +151,16 @@ pub struct SimulateArgs {
     /// Result, a safetensors file.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Examples to enrich the skin with, in place of those that the scene names.
+    /// Database for enrichment, in place of the scene's.
     #[arg(long, value_name = "FILE")]
     pub database: Option<PathBuf>,
-    /// One frame every so many ticks.
+    /// Ticks per frame.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub every: u64,
-    /// Maps the trajectory's box into the room above the object.
+    /// Maps the trajectory's box into the workspace above the object.
     #[arg(long)]
     pub fit: bool,
-    /// Tool of poses that name none; needed where the scene has several.
+    /// Tool of poses without a tool name; required if the scene has several tools.
     #[arg(long, value_name = "NAME")]
     pub tool: Option<String>,
 }
@@ -176,7 +176,7 @@ pub struct BenchArgs {
     /// Element in place of the scene's.
     #[arg(long)]
     pub element: Option<Element>,
-    /// Examples to enrich the skin with, in place of those that the scene names.
+    /// Database for enrichment, in place of the scene's.
     #[arg(long, value_name = "FILE")]
     pub database: Option<PathBuf>,
 }
@@ -197,50 +197,50 @@ pub struct TrainArgs {
     /// Scene file, or `wedge` for the built-in one.
     #[arg(required_unless_present = "job")]
     pub scene: Option<PathBuf>,
-    /// Runs the job of an existing folder, or goes on with it.
+    /// Runs or continues the job of an existing folder.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["scene", "out", "folder", "kind", "examples", "seed", "sensitivity"])]
     pub job: Option<PathBuf>,
     /// Copies the finished database here.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// Folder of the job; the same folder goes on where it was [default: out/train/SCENE-KIND].
+    /// Folder of the job; an unfinished job in it is continued [default: out/train/SCENE-KIND].
     #[arg(long, value_name = "DIR")]
     pub folder: Option<PathBuf>,
-    /// What the examples are for.
+    /// Kind of the database.
     #[arg(long, default_value = "training")]
     pub kind: TrainKind,
-    /// How many; of an evaluation: in the trained region [default: what the scene says].
+    /// Number of examples; for an evaluation, of those in the trained region [default: the scene's].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub examples: Option<u32>,
-    /// Seed of the interactions [default: what the scene says].
+    /// Seed of the interactions [default: the scene's].
     #[arg(long)]
     pub seed: Option<u64>,
-    /// Threads [default: all cores but one].
+    /// Number of threads [default: all cores but one].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub threads: Option<u32>,
-    /// Trains nothing: tabulates over so many interactions how firm the accurate skin is against mesh, tie and reference.
+    /// Instead of training, reports the sensitivity of the accurate skin to mesh, tie and reference, over N interactions.
     #[arg(long, value_name = "N", conflicts_with_all = ["out", "folder", "kind", "examples", "seed"],
           value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub sensitivity: Option<u32>,
 }
 
-/// What examples are for.
+/// Kind of a database.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 #[value(rename_all = "snake_case")]
 pub enum TrainKind {
-    /// To learn from.
+    /// Examples to train on.
     Training,
-    /// Held out, in the trained region and outside of it, with both references.
+    /// Held-out examples in the trained region and outside of it, with both references.
     Evaluation,
 }
 
 /// The two databases of a scene.
 #[derive(Debug, Args)]
 pub struct DatabaseArgs {
-    /// Examples to learn from [default: out/train/SCENE-training/database.safetensors].
+    /// Training examples [default: out/train/SCENE-training/database.safetensors].
     #[arg(long, value_name = "FILE")]
     pub training: Option<PathBuf>,
-    /// Held-out examples to judge by [default: out/train/SCENE-evaluation/database.safetensors].
+    /// Held-out examples [default: out/train/SCENE-evaluation/database.safetensors].
     #[arg(long, value_name = "FILE")]
     pub held_out: Option<PathBuf>,
 }
@@ -248,18 +248,18 @@ pub struct DatabaseArgs {
 /// `plicad evaluate`.
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
-    /// Scene file; left out: the built-in wedge.
+    /// Scene file [default: the built-in wedge].
     pub scene: Option<PathBuf>,
-    /// What is learned from, and judged by.
+    /// Training and held-out examples.
     #[command(flatten)]
     pub databases: DatabaseArgs,
     /// Methods, separated by commas [default: all of them].
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub methods: Vec<String>,
-    /// Learns from the first so many examples [default: all of them].
+    /// Trains on the first N examples [default: all of them].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
     pub examples: Option<u32>,
-    /// Slides through the trained region as well, with an accurate solution at every step: second differences of the detail.
+    /// Also slides through the trained region, with an accurate solution at every step, and reports second differences of the detail.
     #[arg(long)]
     pub slide: bool,
 }
@@ -269,16 +269,16 @@ pub struct EvaluateArgs {
 pub struct ChartArgs {
     /// Scene file with a \[bench\] table, or `wedge` for the built-in one.
     pub scene: PathBuf,
-    /// What is learned from, and judged by.
+    /// Training and held-out examples.
     #[command(flatten)]
     pub databases: DatabaseArgs,
     /// Folder for chart.svg and chart.json [default: out/chart/SCENE].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Measures points again that an earlier run has finished.
+    /// Measures all points again, also those of an earlier run.
     #[arg(long)]
     pub fresh: bool,
-    /// Leaves out other coarse models, each of which is driven to all held-out interactions anew.
+    /// Leaves out other coarse models, each of which must be driven to all held-out interactions.
     #[arg(long)]
     pub quick: bool,
     /// Ticks to time for each coarse model.
@@ -296,9 +296,9 @@ pub struct CheckArgs {
 /// `plicad solve`.
 #[derive(Debug, Args)]
 pub struct SolveArgs {
-    /// Case file; configs/cases/cantilever.toml explains every key.
+    /// Case file; configs/cases/cantilever.toml documents every key.
     pub case: PathBuf,
-    /// Result for ParaView, a .vtu file: displacement, Cauchy and von Mises stress, det F, regions.
+    /// Result for ParaView (.vtu): displacement, Cauchy and von Mises stress, det F, regions.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }
@@ -312,13 +312,13 @@ pub struct DemoArgs {
     /// Poses to play in place of the scripted motion: CSV or TUM.
     #[arg(long, value_name = "FILE")]
     pub poses: Option<PathBuf>,
-    /// Maps the trajectory's box into the room above the object.
+    /// Maps the trajectory's box into the workspace above the object.
     #[arg(long, requires = "poses")]
     pub fit: bool,
-    /// Folder for pictures, GLB, and the examples that the first run trains.
+    /// Folder for pictures, GLB and the examples of the first run.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
-    /// How many examples the first run trains.
+    /// Number of examples that the first run trains.
     #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(2..=100_000))]
     pub examples: u32,
 }

@@ -213,7 +213,7 @@ fn a_job_that_is_asked_to_stop_says_so_and_goes_on_later() {
     println!("stopped after {:.0} ms", 1e3 * asked.elapsed().as_secs_f64());
     assert_eq!(status.code(), Some(75));
     let said = std::io::read_to_string(child.stderr.take().unwrap()).unwrap();
-    assert!(said.contains("plicad: interrupted; what is finished is kept"), "{said}");
+    assert!(said.contains("plicad: interrupted; finished examples are kept"), "{said}");
     assert_eq!(json(&place.path("job/state.json"))["state"], "paused");
     assert!(!place.path("job/database.safetensors").exists());
     let before = fs::read_dir(place.path("job/examples")).unwrap().count();
@@ -229,7 +229,7 @@ fn what_cannot_be_trained_is_refused_in_words() {
     let message = errors(&place.train(&["block.toml", "--folder", "file/job"]));
     assert!(message.contains("file/job"), "{message}");
     let message = errors(&place.train(&["--job", "nowhere"]));
-    assert!(message.contains("nowhere: is no job folder"), "{message}");
+    assert!(message.contains("nowhere: not a job folder"), "{message}");
     assert!(!place.path("nowhere").exists(), "a refused folder is not made");
     fs::create_dir(place.path("empty")).unwrap();
     assert!(errors(&place.train(&["--job", "empty"])).contains("job.json: is missing"));

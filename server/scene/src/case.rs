@@ -1,4 +1,4 @@
-//! Case files of `plicad solve`: [`RawCase`] as typed, [`Case`] checked, [`Problem`] ready to be solved.
+//! Case files of `plicad solve`: [`RawCase`] as typed, [`Case`] checked, [`Problem`] with its selections resolved.
 
 mod checked;
 mod follow;

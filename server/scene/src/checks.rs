@@ -1,14 +1,14 @@
-//! Relations between keys, checked with answers that carry file, line, key and advice. Ranges are checked by `ranges`.
+//! Checks of relations between keys, with errors that carry file, line, key and advice. Ranges are checked by `ranges`.
 
 use nalgebra::{Point3, Quaternion, UnitQuaternion};
 
 use crate::document::Document;
 use crate::error::ConfigError;
 
-/// How far the length of a typed quaternion may be from 1.
+/// Tolerance of a typed quaternion's length around 1.
 const UNIT_TOLERANCE: f64 = 1e-2;
 
-/// Checks of values, with errors at the document's lines.
+/// Checks of a document, with errors at its lines.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Check<'a> {
     document: &'a Document,
@@ -27,12 +27,12 @@ impl<'a> Check<'a> {
         self.document.error(key, problem, advice)
     }
 
-    /// A key that its neighbours make necessary.
+    /// Value of a key that another key requires.
     pub(crate) fn required<T>(&self, key: &str, value: Option<T>, because: &str) -> Result<T, ConfigError> {
         value.ok_or_else(|| self.error(key, format!("is missing: {because} needs it"), "add the key"))
     }
 
-    /// A key that has no meaning beside its neighbours.
+    /// Refuses a key that has no meaning with another one.
     pub(crate) fn absent<T>(&self, key: &str, value: &Option<T>, because: &str) -> Result<(), ConfigError> {
         match value {
             None => Ok(()),
@@ -40,7 +40,7 @@ impl<'a> Check<'a> {
         }
     }
 
-    /// Lower and upper corner of a box with positive extents.
+    /// Lower and upper corner of a box; refuses negative extents.
     pub(crate) fn corners(&self, key: &str, min: [f64; 3], max: [f64; 3]) -> Result<[Point3<f64>; 2], ConfigError> {
         if (0..3).all(|i| min[i] <= max[i]) {
             return Ok([min.into(), max.into()]);
@@ -49,7 +49,7 @@ impl<'a> Check<'a> {
         Err(self.error(&format!("{key}.max_m"), problem, "swap the components so that min_m <= max_m"))
     }
 
-    /// A quaternion of unit length within 1e-2, normalised.
+    /// Normalises a quaternion; refuses a length more than 1e-2 from 1.
     pub(crate) fn rotation(&self, key: &str, xyzw: [f64; 4]) -> Result<UnitQuaternion<f64>, ConfigError> {
         let q = Quaternion::new(xyzw[3], xyzw[0], xyzw[1], xyzw[2]);
         let norm = q.norm();
@@ -60,9 +60,9 @@ impl<'a> Check<'a> {
         Err(self.error(key, problem, "give x, y, z, w of a unit quaternion; no rotation is [0, 0, 0, 1]"))
     }
 
-    /// A name that can be part of a key on the bus.
+    /// Refuses a name that cannot be part of a key on the bus.
     pub(crate) fn name(&self, key: &str, name: &str) -> Result<(), ConfigError> {
         plica_protocol::keys::check_name(name)
-            .map_err(|e| self.error(key, e.to_string(), "rename it: it becomes part of a key on the bus"))
+            .map_err(|e| self.error(key, e.to_string(), "rename it, since it becomes part of a key on the bus"))
     }
 }

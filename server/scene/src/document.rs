@@ -1,4 +1,4 @@
-//! A scene or case file as text with positions, so that an error found long after parsing still names its line.
+//! Text of a scene or case file with the positions of its keys, so that errors found after parsing can name a line.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use toml::de::{DeTable, DeValue};
 
 use crate::error::ConfigError;
 
-/// Text of a file, its name, and where each key stands.
+/// Text of a file, its name, and the position of each key.
 #[derive(Debug)]
 pub struct Document {
     file: PathBuf,
@@ -46,7 +46,7 @@ impl Document {
         &self.file
     }
 
-    /// Deserialises the document; a wrong type or an unknown key becomes a message with line and key.
+    /// Deserialises the document; a wrong type or an unknown key is an error with line and key.
     pub fn read<T: serde::de::DeserializeOwned>(&self) -> Result<T, ConfigError> {
         toml::from_str(&self.text).map_err(|e| {
             let offset = e.span().map(|s| s.start);

@@ -1,9 +1,9 @@
-//! What is wrong with a scene file, told once and completely.
+//! Error of a scene or case file: place, problem and advice.
 
 use std::fmt;
 use std::path::PathBuf;
 
-/// One thing wrong with a scene file: where, which key, what, and what to do.
+/// Error of a scene or case file, with file, line, key, problem and advice.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ConfigError {
     /// File.
@@ -12,9 +12,9 @@ pub struct ConfigError {
     pub line: Option<usize>,
     /// Dotted path of the key; empty for a syntax error.
     pub key: String,
-    /// What is wrong, with the allowed range where there is one.
+    /// Problem, with the allowed range if there is one.
     pub problem: String,
-    /// What to do.
+    /// Advice.
     pub advice: String,
 }
 

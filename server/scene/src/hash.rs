@@ -1,10 +1,10 @@
-//! Which scene examples belong to: SHA-256 of what decides their values.
+//! Scene hash: SHA-256 of everything in a scene that determines the values of its examples.
 //!
 //! Canonical JSON of the checked scene: the object with its materials and supports, gravity, coarse mesh and element, skin
-//! and embedding, accurate model, tie, friction, and the tools' shapes; of mesh files their bytes. Not in it: what is
-//! published, how it runs (but for gravity, which deforms both models), how the linear solver gets to its result, how tools
-//! follow their devices, what training draws, and how examples are used. Numbers are those that were typed; nothing
-//! computed from them is hashed, since a last digit may differ between machines.
+//! and embedding, accurate model, tie, friction, and the tools' shapes; bytes of mesh files. Left out:
+//! publishing, run time (except gravity, which deforms both models), options of the linear solver, coupling of tools to their
+//! devices, ranges of training, and enrichment. Numbers are hashed as typed; computed numbers are not, since their last digit
+//! may differ between machines.
 
 use std::path::PathBuf;
 
@@ -16,7 +16,7 @@ use sha2::{Digest, Sha256};
 
 use crate::scene::{Config, MeshConfig, ObjectConfig, Region};
 
-/// Raised when the meaning of the hash changes.
+/// Version of the hash, raised when its meaning changes.
 const HASH_VERSION: u32 = 1;
 
 /// A file that belongs to the scene cannot be read.
@@ -28,7 +28,7 @@ pub struct HashError {
     source: std::io::Error,
 }
 
-/// 64 hexadecimal digits that name what the examples of this scene depend on.
+/// Scene hash, 64 hexadecimal digits.
 ///
 /// # Errors
 /// A mesh file cannot be read.
@@ -87,7 +87,7 @@ fn accurate_material(m: &plica_accurate::Material) -> Value {
     json!([model, m.young_modulus_pa, m.poisson_ratio])
 }
 
-/// The name is for people.
+/// Region without its name, which is for people.
 fn region(r: &Region) -> Value {
     json!({
         "corners": [r.corners[0].coords.as_slice(), r.corners[1].coords.as_slice()],
@@ -100,7 +100,7 @@ fn tool(config: &Config, tool: &ToolDescription) -> Result<Value, HashError> {
     let shape = match &tool.shape {
         ToolShape::Ball { radius_m } => json!({ "ball": radius_m }),
         ToolShape::Capsule { radius_m, length_m } => json!({ "capsule": [radius_m, length_m] }),
-        // Halves of what was typed: exact.
+        // Halves of the typed numbers, exact.
         ToolShape::Cuboid { half_extents_m } => json!({ "cuboid": half_extents_m }),
         ToolShape::ConvexHull { polytope } => {
             json!({ "hull": polytope.points().iter().map(|p| p.coords.as_slice().to_vec()).collect::<Vec<_>>() })
@@ -110,7 +110,7 @@ fn tool(config: &Config, tool: &ToolDescription) -> Result<Value, HashError> {
     Ok(json!({ "name": tool.name, "shape": shape, "friction": tool.friction }))
 }
 
-/// Bytes of a mesh file and its scale; not its points, which are computed.
+/// Checksum of a mesh file and its scale. Points are computed and therefore left out.
 fn mesh_file(config: &Config, tool: &str) -> Result<Value, HashError> {
     let key = format!("tools.{tool}.shape.mesh.file");
     let Some(file) = config.files().iter().find(|f| f.key == key) else { return Ok(Value::Null) };

@@ -1,5 +1,5 @@
-//! What files say: scenes, cases of the accurate solver and recorded motions, checked; and from them the descriptions that
-//! the simulation, the accurate solver and training are built from.
+//! Scenes, cases of the accurate solver and recorded motions: read from files, checked, and converted to descriptions for the
+//! simulation, the accurate solver and training.
 //!
 //! A file is parsed once into a raw type (as typed) and once into a checked type (SI units, every number within its range).
 //! The numerical crates check their own inputs again, since they are libraries.

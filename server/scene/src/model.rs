@@ -1,4 +1,4 @@
-//! From a checked scene to what the simulation is built from.
+//! Model descriptions from a checked scene.
 
 use nalgebra::{Point3, Vector3};
 use plica_geometry::{Embedding, EmbeddingError, HexIdx, HexMesh, Skin, shapes};
@@ -7,10 +7,10 @@ use plica_training::AccurateDescription;
 
 use crate::scene::{Config, Face, FixedConfig, MeshConfig, ObjectConfig, Region};
 
-/// A node closer to a face than this share of the object's size lies on it.
+/// Distance of a node from a face at which it lies on the face, as a share of the object's size.
 const ON_FACE: f64 = 1e-6;
 
-/// Why a checked scene still makes no model.
+/// Why a checked scene has no model.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneModelError {
     /// The skin cannot be interpolated from the mesh.
@@ -23,7 +23,7 @@ pub enum SceneModelError {
         /// Why.
         source: EmbeddingError,
     },
-    /// A support that holds nothing is a mistake.
+    /// A support holds no node.
     #[error(
         "{file}: objects.{object}.supports.fixed.{what} holds no coarse node; move or enlarge it (the object spans {extents:?} m)"
     )]
@@ -32,7 +32,7 @@ pub enum SceneModelError {
         file: String,
         /// The object.
         object: String,
-        /// Which face or box.
+        /// Face or box.
         what: String,
         /// Extents of the object \[m\].
         extents: [f64; 3],
@@ -47,13 +47,13 @@ pub enum SceneModelError {
     },
 }
 
-/// The model of a scene.
+/// Real-time model of a scene.
 pub fn build(config: &Config) -> Result<Model, SceneModelError> {
     let file = config.file().display().to_string();
     Model::new(describe(config)?).map_err(|source| SceneModelError::Model { file, source })
 }
 
-/// What the model of a scene is built from.
+/// Description of the real-time model of a scene.
 pub fn describe(config: &Config) -> Result<ModelDescription, SceneModelError> {
     let object = config.object();
     let (mesh, skin) = generate(object);
@@ -81,7 +81,7 @@ pub fn describe(config: &Config) -> Result<ModelDescription, SceneModelError> {
     })
 }
 
-/// The accurate model of a scene, with its own divisions or with others.
+/// Description of the accurate model of a scene, with the scene's divisions or other ones.
 ///
 /// # Errors
 /// [`SceneModelError::EmptySupport`].
@@ -102,7 +102,7 @@ pub fn describe_accurate(
     })
 }
 
-/// The skin of a scene's object.
+/// Skin of a scene's object.
 pub fn skin(config: &Config) -> Skin {
     generate(config.object()).1
 }
@@ -129,7 +129,7 @@ fn materials(object: &ObjectConfig, mesh: &HexMesh) -> Vec<Material> {
     mesh.hex_indices().map(material).collect()
 }
 
-/// The last region that holds a hexahedron's centre.
+/// Last region that contains the centre of a hexahedron.
 fn region_of<'a>(object: &'a ObjectConfig, mesh: &HexMesh, hex: HexIdx) -> Option<&'a Region> {
     let corners = mesh.corner_positions(hex);
     let centre = Point3::from(corners.iter().map(|c| c.coords).sum::<Vector3<f64>>() / 8.0);
@@ -158,7 +158,7 @@ fn fixed_nodes(config: &Config, mesh: &HexMesh) -> Result<Vec<bool>, SceneModelE
     Ok(fixed)
 }
 
-/// Holds the nodes for which `picks`; whether there is one.
+/// Holds the nodes that `picks` selects. Returns whether there is one.
 fn hold(fixed: &mut [bool], mesh: &HexMesh, picks: impl Fn(&Point3<f64>) -> bool) -> bool {
     let mut any = false;
     for (held, position) in fixed.iter_mut().zip(mesh.nodes()) {

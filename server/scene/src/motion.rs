@@ -10,23 +10,23 @@ use plica_trajectory::{self as trajectory, Fit, Terrain, TrackedPose, Trajectory
 use crate::model;
 use crate::scene::{Config, MeshConfig};
 
-/// Why poses cannot be used.
+/// Why recorded poses cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum MotionError {
-    /// The file is not what it should be.
+    /// The file cannot be read.
     #[error(transparent)]
     Trajectory(#[from] TrajectoryError),
-    /// A tool that the scene does not have.
+    /// The scene does not have a named tool.
     #[error("{file}: there is no tool `{tool}` in the scene; it has: {known}")]
     UnknownTool {
         /// The pose file.
         file: String,
-        /// The name.
+        /// Name in the file.
         tool: String,
         /// The scene's tools.
         known: String,
     },
-    /// Poses without a tool's name, and several tools.
+    /// The file names no tool, and the scene has several.
     #[error("{file} names no tool, and the scene has {known}; choose one with --tool")]
     WhichTool {
         /// The pose file.
@@ -36,7 +36,7 @@ pub enum MotionError {
     },
 }
 
-/// A pose and when it arrives.
+/// A pose and its time of arrival.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimedPose {
     /// Time \[s\].
@@ -47,7 +47,7 @@ pub struct TimedPose {
     pub sample: PoseSample,
 }
 
-/// Reads poses for a scene, in order of time, and what `fit` did if it was asked for.
+/// Reads poses for a scene, in order of time; with `fit` also the map of the fit.
 pub fn read(
     file: &Path,
     config: &Config,
@@ -77,7 +77,7 @@ fn sample(tracked: &TrackedPose, sequence: u64) -> PoseSample {
     let source_time_ns = (tracked.time_s.max(0.0) * 1e9).round() as u64;
     PoseSample {
         sequence,
-        // As on the bus, where 0 means that the source does not know its time.
+        // As on the bus: 0 is an unknown time.
         source_time_ns: (source_time_ns != 0).then_some(source_time_ns),
         valid: true,
         pose: Isometry3::from_parts(Translation3::from(tracked.position_m), rotation),
@@ -106,7 +106,7 @@ fn known(config: &Config) -> String {
     if names.is_empty() { "no tools".into() } else { names.join(", ") }
 }
 
-/// Fits a motion onto the object's skin, as `plica probe --fit` does with the mesh that it is given.
+/// Fits a motion onto the object's skin, as `plica probe --fit` does with the mesh of the daemon.
 fn fit_onto(config: &Config, tool: usize, tracked: &mut [TrackedPose]) -> Result<Fit, TrajectoryError> {
     let surface = DisplaySurface::new(&model::skin(config));
     let terrain = Terrain::new(&surface.rest, &surface.triangles).expect("a closed skin has triangles");
@@ -122,7 +122,7 @@ pub fn top_height_m(config: &Config, x: f64) -> f64 {
     }
 }
 
-/// How far a tool reaches below its origin \[m\].
+/// Extent of a tool below its origin \[m\].
 pub fn tip_radius_m(tool: &ToolDescription) -> f64 {
     let lowest = |points: &mut dyn Iterator<Item = f64>| points.fold(0.0_f64, |low, z| low.max(-z));
     match &tool.shape {

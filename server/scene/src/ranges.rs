@@ -1,5 +1,5 @@
-//! Ranges of numbers: each is written once, as an attribute of the key in the raw type. The JSON Schema of that type carries it
-//! as `minimum` and `maximum`, and every number of a document is compared with it here.
+//! Ranges of numbers. Each range is written once, as an attribute of the key in the raw type; the JSON Schema of that type
+//! carries it as `minimum` and `maximum`, with which every number of a document is compared here.
 
 use serde_json::Value;
 
@@ -18,7 +18,7 @@ pub(crate) struct Range {
 }
 
 impl Range {
-    /// Whether `value` is allowed; never for a number that is not finite.
+    /// Whether `value` is allowed; false for numbers that are not finite.
     pub(crate) fn contains(&self, value: f64) -> bool {
         (self.least..=self.most).contains(&value)
     }
@@ -40,7 +40,7 @@ pub(crate) fn range(schema: &Value, path: &[String]) -> Option<Range> {
     descend(schema, schema, path, "")
 }
 
-/// `meaning` is the documentation of the innermost key above `node`: elements of arrays have none of their own.
+/// `meaning` is the documentation of the innermost key above `node`, since elements of arrays have none.
 fn descend(root: &Value, node: &Value, path: &[String], meaning: &str) -> Option<Range> {
     let meaning = node["description"].as_str().unwrap_or(meaning);
     let here = path.is_empty().then(|| own_range(node, meaning)).flatten();

@@ -1,4 +1,4 @@
-//! Scene files: [`RawConfig`] is what was typed, [`Config`] is what is meant. Parsed and checked once; nothing checks again.
+//! Scene files: [`RawConfig`] as typed, [`Config`] checked.
 
 mod accurate;
 mod bench;
@@ -32,7 +32,7 @@ use crate::document::Document;
 use crate::error::ConfigError;
 use crate::ranges;
 
-/// The wedge that runs when no scene is named.
+/// Text of the built-in scene, the wedge.
 pub const BUILT_IN_SCENE: &str = include_str!("../../../configs/scenes/wedge.toml");
 
 /// A checked scene. SI units; every number is within the range that `plicad schema` names.
@@ -140,27 +140,27 @@ impl Config {
         &self.runtime
     }
 
-    /// What `plicad bench` does with the tools.
+    /// Scripted tool motion of `plicad bench`.
     pub fn bench(&self) -> Option<&BenchConfig> {
         self.bench.as_ref()
     }
 
-    /// What `plicad train` does.
+    /// Interactions and sampling of `plicad train`.
     pub fn training(&self) -> &TrainingConfig {
         &self.training
     }
 
-    /// How examples become detail on the skin.
+    /// Enrichment method and its options.
     pub fn enrichment(&self) -> &EnrichmentConfig {
         &self.enrichment
     }
 
-    /// Names the examples to start with, in place of those that the scene names.
+    /// Replaces the database to start with.
     pub fn set_database(&mut self, file: PathBuf) {
         self.enrichment.database = Some(file);
     }
 
-    /// Files that belong to the scene, and go with it into a job's folder.
+    /// Files that the scene names; they are copied into the folder of a job.
     pub fn files(&self) -> &[SceneFile] {
         &self.files
     }
@@ -175,7 +175,7 @@ impl Config {
         self.object.planes()
     }
 
-    /// When the object sleeps.
+    /// Sleep of an object at rest.
     pub fn sleep(&self) -> &SleepOptions {
         self.runtime.sleep()
     }

@@ -1,4 +1,4 @@
-//! From a checked scene to the set-up of training.
+//! Set-up of training from a checked scene.
 
 use std::path::Path;
 
@@ -10,10 +10,10 @@ use crate::model::{self, SceneModelError};
 use crate::motion::{self, MotionError};
 use crate::scene::{Config, TrainingConfig};
 
-/// Why there is nothing to train.
+/// Why a scene cannot be trained.
 #[derive(Debug, thiserror::Error)]
 pub enum SetupError {
-    /// The scene makes no model.
+    /// The scene has no model.
     #[error(transparent)]
     Scene(#[from] SceneModelError),
     /// A file that the scene names cannot be read.
@@ -27,7 +27,7 @@ pub enum SetupError {
         /// Why.
         source: MotionError,
     },
-    /// Nothing touches the object.
+    /// The scene has no tool.
     #[error("{file}: the scene has no tool to train with; add a table [tools.<name>]")]
     NoTool {
         /// The scene.
@@ -35,7 +35,7 @@ pub enum SetupError {
     },
 }
 
-/// What training is told about a scene.
+/// Set-up of training on a scene.
 ///
 /// # Errors
 /// See [`SetupError`].

@@ -1,14 +1,12 @@
 //! The accurate half of the tandem: quasi-static solves from rest, tied, loaded, or with contact of their own.
 
-use std::ops::ControlFlow;
-
 use nalgebra::Vector3;
 use plica_accurate::contact::{ContactError, ContactParams, ContactState, ContactSurface, Obstacle, Press};
 use plica_accurate::{Constraints, Energy, NodalForces, Params, Progress, Solid, SolveError, Solver, Tie};
 use plica_geometry::{Embedding, EmbeddingKind, HexIdx, HexMesh, NodeIdx, Skin, isoparametric};
 use serde::{Deserialize, Serialize};
 
-use crate::coarse::{Cancelled, Interrupted};
+use crate::coarse::{Interrupted, SolveObserver};
 use crate::error::BuildError;
 use crate::setup::AccurateDescription;
 use crate::tool_path::ToolPath;
@@ -44,6 +42,15 @@ pub struct AccurateResult {
     pub tool_force: Vector3<f64>,
     /// How the solve went.
     pub solve: SolveInfo,
+}
+
+/// Size of the accurate model's linear systems.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AccurateSize {
+    /// Free unknowns.
+    pub n_unknowns: usize,
+    /// Values of the Cholesky factor.
+    pub n_factor_values: usize,
 }
 
 /// How an accurate solve went.
@@ -102,9 +109,10 @@ impl Accurate {
         Ok(Self { rest, solid, weight, constraints, embedding, surface, contact, solver })
     }
 
-    /// Free unknowns, and values of the Cholesky factor.
-    pub fn size(&self) -> (usize, usize) {
-        self.solver.size()
+    /// Size of the linear systems.
+    pub fn size(&self) -> AccurateSize {
+        let (n_unknowns, n_factor_values) = self.solver.size();
+        AccurateSize { n_unknowns, n_factor_values }
     }
 
     /// Skin vertices as rows over the accurate nodes.
@@ -116,9 +124,9 @@ impl Accurate {
     ///
     /// # Errors
     /// See [`AccurateFailure`].
-    pub fn tied(&mut self, tie: &Tie, cancelled: Cancelled<'_>) -> Result<AccurateResult, AccurateFailure> {
+    pub fn tied(&mut self, tie: &Tie, observer: SolveObserver<'_>) -> Result<AccurateResult, AccurateFailure> {
         let mut x = self.rest.clone();
-        let solve = self.minimise(&[tie], &mut x, cancelled)?;
+        let solve = self.minimise(&[tie], &mut x, observer)?;
         Ok(AccurateResult { offsets: self.offsets(&x), tool_force: -tie.force(&x), solve })
     }
 
@@ -129,7 +137,7 @@ impl Accurate {
     pub fn loaded(
         &mut self,
         skin_forces: &[Vector3<f64>],
-        cancelled: Cancelled<'_>,
+        observer: SolveObserver<'_>,
     ) -> Result<AccurateResult, AccurateFailure> {
         let nodal = self.embedding.apply_transpose(skin_forces);
         let share = |share: f64| {
@@ -137,13 +145,13 @@ impl Accurate {
             NodalForces::new(loads.map(|(n, f)| (NodeIdx::from_index(n), f * share)).collect())
         };
         let mut x = self.rest.clone();
-        let mut solve = self.minimise(&[&share(1.0)], &mut x, cancelled);
+        let mut solve = self.minimise(&[&share(1.0)], &mut x, observer);
         if let Err(AccurateFailure::Failed(_)) = solve {
             x.copy_from_slice(&self.rest);
             let mut sum = SolveInfo::default();
             for step in 1..=LOAD_STEPS {
                 let load = share(f64::from(step) / f64::from(LOAD_STEPS));
-                sum = sum.followed_by(&self.minimise(&[&load], &mut x, cancelled)?);
+                sum = sum.followed_by(&self.minimise(&[&load], &mut x, observer)?);
             }
             solve = Ok(sum);
         }
@@ -160,11 +168,11 @@ impl Accurate {
         obstacle: &Obstacle,
         friction: f64,
         path: &ToolPath,
-        cancelled: Cancelled<'_>,
+        observer: SolveObserver<'_>,
     ) -> Result<AccurateResult, AccurateFailure> {
         let mut x = self.rest.clone();
         if self.weight.is_some() {
-            self.minimise(&[], &mut x, cancelled)?;
+            self.minimise(&[], &mut x, observer)?;
         }
         let (start, waypoints) = (path.poses()[0], &path.poses()[1..]);
         let mut state = ContactState::untouched(&self.surface, &start, &x);
@@ -177,7 +185,7 @@ impl Accurate {
             friction,
             params: self.contact,
         };
-        let mut watch = |_| stop_if(cancelled());
+        let mut watch = |_| observer();
         let info =
             setting.follow(waypoints, &mut self.solver, &mut state, &mut x, &mut watch).map_err(|e| match e {
                 ContactError::Cancelled { .. } => AccurateFailure::Interrupted,
@@ -196,11 +204,11 @@ impl Accurate {
         &mut self,
         loads: &[&dyn Energy],
         x: &mut [Vector3<f64>],
-        cancelled: Cancelled<'_>,
+        observer: SolveObserver<'_>,
     ) -> Result<SolveInfo, AccurateFailure> {
         let energies = energies(&self.solid, &self.weight, loads);
         let params = Params { tolerance: TOLERANCE, max_iterations: MAX_ITERATIONS };
-        let mut watch = |_: Progress| stop_if(cancelled());
+        let mut watch = |_: Progress| observer();
         match self.solver.minimise(&energies, &self.constraints, &params, x, &mut watch) {
             Ok(info) => Ok(SolveInfo {
                 iterations: info.iterations,
@@ -229,10 +237,6 @@ impl SolveInfo {
             ..*next
         }
     }
-}
-
-fn stop_if(stop: bool) -> ControlFlow<()> {
-    if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }
 
 fn energies<'a>(solid: &'a Solid, weight: &'a Option<NodalForces>, loads: &[&'a dyn Energy]) -> Vec<&'a dyn Energy> {

@@ -33,20 +33,20 @@ fn write(value: &Value, text: &mut String) {
         Value::Object(map) => {
             let mut entries: Vec<_> = map.iter().collect();
             entries.sort_unstable_by_key(|(key, _)| *key);
-            list(text, ('{', '}'), entries, |text, (key, value)| {
+            list(text, ['{', '}'], entries, |text, (key, value)| {
                 write(&Value::String(key.clone()), text);
                 text.push(':');
                 write(value, text);
             });
         }
-        Value::Array(items) => list(text, ('[', ']'), items, |text, item| write(item, text)),
+        Value::Array(items) => list(text, ['[', ']'], items, |text, item| write(item, text)),
         other => text.push_str(&other.to_string()),
     }
 }
 
 fn list<T>(
     text: &mut String,
-    (open, close): (char, char),
+    [open, close]: [char; 2],
     items: impl IntoIterator<Item = T>,
     mut each: impl FnMut(&mut String, T),
 ) {

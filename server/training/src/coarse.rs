@@ -1,5 +1,7 @@
 //! The coarse half of the tandem: the real-time model is driven to an interaction and settles there.
 
+use std::ops::ControlFlow;
+
 use nalgebra::{Isometry3, Point3, Vector3};
 use plica_sim::{
     Coupling, Model, ModelDescription, ModelError, NoProbe, PoseSample, Sampling, State, TickInput, ToolPose,
@@ -9,8 +11,8 @@ use plica_sim::{
 use crate::setup::DriveOptions;
 use crate::tool_path::ToolPath;
 
-/// Every so many ticks somebody is asked whether to go on.
-const TICKS_PER_QUESTION: u64 = 32;
+/// Ticks between two calls of the observer.
+const TICKS_PER_CALL: u64 = 32;
 
 /// The real-time model with rigid tools, ready to be driven from rest again and again.
 pub struct Coarse {
@@ -18,6 +20,13 @@ pub struct Coarse {
     workspace: Workspace,
     state: State,
     at_rest: State,
+}
+
+/// A tool and its pose, `world <- tool`.
+#[derive(Debug, Clone, Copy)]
+struct PlacedTool {
+    tool: usize,
+    pose: Isometry3<f64>,
 }
 
 /// How the model came to rest.
@@ -50,10 +59,10 @@ pub struct CoarseResult {
     pub settling: Settling,
 }
 
-/// Asked now and then; true means stop.
-pub type Cancelled<'a> = &'a (dyn Fn() -> bool + Sync);
+/// Observer of a solve: called every few ticks and before every Newton step. `Break` ends the solve.
+pub type SolveObserver<'a> = &'a mut dyn FnMut() -> ControlFlow<()>;
 
-/// Asked to stop.
+/// A solve that its observer ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Interrupted;
 
@@ -93,10 +102,10 @@ impl Coarse {
         tool: usize,
         path: &ToolPath,
         drive: &DriveOptions,
-        cancelled: Cancelled<'_>,
+        observer: SolveObserver<'_>,
     ) -> Result<CoarseResult, Interrupted> {
         self.restart();
-        self.go_on(tool, path, drive, cancelled)
+        self.go_on(tool, path, drive, observer)
     }
 
     /// The same from the present state, in which the tool is at the start of `path`.
@@ -108,13 +117,13 @@ impl Coarse {
         tool: usize,
         path: &ToolPath,
         drive: &DriveOptions,
-        cancelled: Cancelled<'_>,
+        observer: SolveObserver<'_>,
     ) -> Result<CoarseResult, Interrupted> {
         let n_ticks = (path.length_m() / (drive.speed_m_per_s * self.model.timestep_s())).ceil() as u64;
         for k in 0..=n_ticks {
-            self.tick(Some((tool, path.at(k as f64 / n_ticks.max(1) as f64))), cancelled)?;
+            self.tick(Some(PlacedTool { tool, pose: path.at(k as f64 / n_ticks.max(1) as f64) }), observer)?;
         }
-        let settling = self.settle(Some((tool, *path.end())), drive, cancelled)?;
+        let settling = self.settle(Some(PlacedTool { tool, pose: *path.end() }), drive, observer)?;
         let reading = &self.state.tools()[tool];
         let contact_point = reading.in_contact.then_some(reading.reference_contact_point_m);
         Ok(self.result(contact_point, reading.contact_force_n, settling))
@@ -128,10 +137,10 @@ impl Coarse {
         &mut self,
         forces: &[Vector3<f64>],
         drive: &DriveOptions,
-        cancelled: Cancelled<'_>,
+        observer: SolveObserver<'_>,
     ) -> Result<CoarseResult, Interrupted> {
         self.state.set_external_forces(&self.model, forces);
-        let settling = self.settle(None, drive, cancelled)?;
+        let settling = self.settle(None, drive, observer)?;
         Ok(self.result(None, Vector3::zeros(), settling))
     }
 
@@ -140,13 +149,13 @@ impl Coarse {
         self.state.copy_from(&self.at_rest);
     }
 
-    fn tick(&mut self, pose: Option<(usize, Isometry3<f64>)>, cancelled: Cancelled<'_>) -> Result<(), Interrupted> {
+    fn tick(&mut self, placed: Option<PlacedTool>, observer: SolveObserver<'_>) -> Result<(), Interrupted> {
         let number = self.state.tick();
-        if number.is_multiple_of(TICKS_PER_QUESTION) && cancelled() {
+        if number.is_multiple_of(TICKS_PER_CALL) && observer().is_break() {
             return Err(Interrupted);
         }
         let sample = |pose| PoseSample { sequence: number + 1, source_time_ns: None, valid: true, pose };
-        let pose = pose.map(|(tool, pose)| ToolPose { tool, sample: sample(pose) });
+        let pose = placed.map(|placed| ToolPose { tool: placed.tool, sample: sample(placed.pose) });
         let input = TickInput { clock_s: self.state.sim_time_s(), poses: pose.as_slice() };
         tick(&self.model, input, &mut self.state, &mut self.workspace, &mut NoProbe);
         Ok(())
@@ -155,9 +164,9 @@ impl Coarse {
     /// Holds until no node has moved farther than `settled_m` within a window, as long as patience lasts.
     fn settle(
         &mut self,
-        pose: Option<(usize, Isometry3<f64>)>,
+        placed: Option<PlacedTool>,
         drive: &DriveOptions,
-        cancelled: Cancelled<'_>,
+        observer: SolveObserver<'_>,
     ) -> Result<Settling, Interrupted> {
         let ticks = |seconds: f64| (seconds / self.model.timestep_s()).round().max(1.0) as u64;
         let (window, patience) = (ticks(drive.window_s), ticks(drive.patience_s));
@@ -165,7 +174,7 @@ impl Coarse {
         while waited < patience && motion_m > drive.settled_m {
             let before = self.state.node_displacements(&self.model);
             for _ in 0..window {
-                self.tick(pose, cancelled)?;
+                self.tick(placed, observer)?;
             }
             waited += window;
             let now = self.state.node_displacements(&self.model);

@@ -1,4 +1,4 @@
-//! Why nothing was trained.
+//! Errors of training.
 
 use std::io::ErrorKind;
 use std::path::PathBuf;
@@ -49,7 +49,7 @@ pub enum BuildError {
     /// The skin does not lie in the accurate mesh.
     #[error("accurate model")]
     Embedding(#[from] EmbeddingError),
-    /// A tool without volume.
+    /// A tool has no volume.
     #[error("tool `{tool}`")]
     Tool {
         /// The tool.
@@ -57,8 +57,8 @@ pub enum BuildError {
         /// Why.
         source: HullError,
     },
-    /// Something that the accurate model cannot do yet.
-    #[error("the accurate model knows no {what}; remove them from the scene to train on it")]
+    /// The accurate model lacks a feature of the scene.
+    #[error("the accurate model does not support {what}; remove them from the scene to train on it")]
     Unsupported {
         /// What.
         what: &'static str,
@@ -79,26 +79,26 @@ pub enum TrainingError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         error: std::io::Error,
     },
-    /// A file of the job is not what it should be.
+    /// A file of the job is malformed or belongs to another job.
     #[error("{path}: {problem}", path = path.display())]
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it, and what to do.
+        /// Problem and advice.
         problem: String,
     },
-    /// Asked to stop. Finished examples are kept.
-    #[error("interrupted; what is finished is kept, the same command goes on from there")]
+    /// Ended by the observer. Finished examples are kept.
+    #[error("interrupted; finished examples are kept, the same command continues from there")]
     Interrupted,
     /// Threads cannot be started.
     #[error("{n_threads} threads cannot be started: {reason}")]
     Threads {
         /// How many.
         n_threads: usize,
-        /// What the system said.
+        /// Error of the operating system.
         reason: String,
     },
 }
@@ -106,7 +106,7 @@ pub enum TrainingError {
 /// Exit code of a process that ends with [`TrainingError::Interrupted`].
 pub const INTERRUPTED: u8 = 75;
 
-/// What to do about a full disk.
+/// Advice for a full disk.
 fn advice(error: &std::io::Error) -> &'static str {
     match error.kind() {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {

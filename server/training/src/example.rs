@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::accurate::SolveInfo;
 use crate::coarse::Settling;
-use crate::interaction::Interaction;
 use plica_geometry::ContactFrame;
 use plica_sim::enrichment::Touch;
 
@@ -30,11 +29,11 @@ pub struct Example {
     pub tied_force: [f64; 3],
     /// Force on the tool \[N\]: accurate, its own contact; evaluation only.
     pub independent_force: Option<[f64; 3]>,
-    /// What the metadata says about it.
+    /// Its record in the metadata.
     pub record: Record,
 }
 
-/// What a database's metadata says about an example.
+/// Record of an example in the metadata of a database.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
@@ -125,33 +124,12 @@ pub enum Reason {
     NotFinite,
 }
 
-impl Rejection {
-    /// An interaction that gives no example.
-    pub(crate) fn new(
-        (index, interaction_sha256): (u32, String),
-        interaction: &Interaction,
-        reason: Reason,
-        message: String,
-    ) -> Self {
-        Self {
-            index,
-            kind: interaction.kind.clone(),
-            reason,
-            message,
-            contact_point_m: interaction.contact_point_m,
-            depth_m: interaction.depth_m(),
-            drag_m: interaction.drag().into(),
-            interaction_sha256,
-        }
-    }
-}
-
-/// What became of an interaction.
+/// Outcome of an interaction.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
-    /// It is stored.
+    /// Solved: an example that is stored.
     Accepted(Box<Example>),
-    /// It is listed.
+    /// Rejected: listed with the reason.
     Rejected(Rejection),
 }
 

@@ -1,10 +1,11 @@
-//! The job itself: plan, solve in parallel, assemble.
+//! Runs a job: plans, solves in parallel, assembles the database.
 
 use std::ops::ControlFlow;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::Instant;
 
+use crate::accurate::AccurateSize;
 use crate::database::{About, Database, DatabaseKind};
 use crate::error::{PlanError, TrainingError};
 use crate::example::Outcome;
@@ -32,7 +33,7 @@ pub fn run(
     observer: Observer<'_>,
 ) -> Result<TrainingReport, TrainingError> {
     let begin = Instant::now();
-    let (sets, seed) = ask(setup, job);
+    let (sets, seed) = sets_and_seed(setup, job);
     let about = About::new(&setup.scene_hash, job.kind, seed);
     let total = sets.iter().map(|set| set.count as u32).sum();
     let mut tally = Tally::new(folder, observer, total, n_threads);
@@ -51,7 +52,7 @@ pub fn run(
     let n_resumed = interactions.len() - open.len();
     let n_threads = n_threads.clamp(1, open.len().max(1));
     let work = Work { setup, interactions: &interactions, open: &open, about: &about, kind: job.kind };
-    let sizes = work.run(n_threads, folder, &tally)?;
+    let size = work.run(n_threads, folder, &tally)?;
     tally.announce(TrainingStage::Database)?;
     let database = assemble(folder, &about, &fingerprints)?;
     let path = folder.paths().database();
@@ -67,13 +68,13 @@ pub fn run(
         resumed: n_resumed,
         ..tally.times()
     };
-    let report = TrainingReport::new(setup, &database, interactions.len(), sizes, run);
+    let report = TrainingReport::new(setup, &database, interactions.len(), size, run);
     folder.set_report(&report)?;
     Ok(report)
 }
 
 /// Sets and seed: the scene's, unless the job says otherwise.
-fn ask(setup: &Setup, job: &TrainingJob) -> (Vec<InteractionSet>, u64) {
+fn sets_and_seed(setup: &Setup, job: &TrainingJob) -> (Vec<InteractionSet>, u64) {
     let (mut sets, seed) = match job.kind {
         DatabaseKind::Training => (vec![setup.training.clone()], setup.training_seed),
         DatabaseKind::Evaluation => (setup.evaluation.clone(), setup.evaluation_seed),
@@ -84,7 +85,7 @@ fn ask(setup: &Setup, job: &TrainingJob) -> (Vec<InteractionSet>, u64) {
     (sets, job.seed.unwrap_or(seed))
 }
 
-/// What is to be solved.
+/// Interactions to solve.
 struct Work<'a> {
     setup: &'a Setup,
     interactions: &'a [Interaction],
@@ -94,23 +95,21 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// One sequential solve per thread, in the order of the plan. Sizes of the accurate model: unknowns, factor values.
-    fn run(
-        &self,
-        n_threads: usize,
-        folder: &TrainingFolder,
-        tally: &Tally<'_>,
-    ) -> Result<(usize, usize), TrainingError> {
+    /// One sequential solve per thread, in the order of the plan.
+    fn run(&self, n_threads: usize, folder: &TrainingFolder, tally: &Tally<'_>) -> Result<AccurateSize, TrainingError> {
         let threads = |e: rayon::ThreadPoolBuildError| TrainingError::Threads { n_threads, reason: e.to_string() };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().map_err(threads)?;
         let (next, failed) = (AtomicUsize::new(0), AtomicUsize::new(0));
-        let cancelled = || tally.is_cancelled() || failed.load(Relaxed) > 0;
         let worker = |_: rayon::BroadcastContext<'_>| {
             let mut tandem = Tandem::new(self.setup)?;
+            let mut observe = || match tally.observe() {
+                ControlFlow::Continue(()) if failed.load(Relaxed) == 0 => ControlFlow::Continue(()),
+                _ => ControlFlow::Break(()),
+            };
             while let Some(&index) = self.open.get(next.fetch_add(1, Relaxed)) {
                 let begin = Instant::now();
                 let two = self.kind == DatabaseKind::Evaluation;
-                let outcome = tandem.solve(index as u32, &self.interactions[index], two, &cancelled);
+                let outcome = tandem.solve(index as u32, &self.interactions[index], two, &mut observe);
                 let outcome = outcome.map_err(|_| TrainingError::Interrupted)?;
                 folder.store(self.about, &outcome)?;
                 tally.solved(&outcome, begin.elapsed().as_secs_f64())?;
@@ -151,7 +150,7 @@ fn first_message(database: &Database) -> String {
     database.rejected.first().map_or_else(String::new, |r| r.message.clone())
 }
 
-/// Counts what is finished, times it, and reports it to the folder and the observer.
+/// Counts and times finished interactions, and reports progress to the folder and the observer.
 struct Tally<'a> {
     folder: &'a TrainingFolder,
     total: u32,
@@ -205,11 +204,12 @@ impl<'a> Tally<'a> {
         Ok(())
     }
 
-    fn is_cancelled(&self) -> bool {
+    /// `Break` once the observer has ended the job.
+    fn observe(&self) -> ControlFlow<()> {
         let mut shared = self.shared();
         let progress = self.progress(&shared.counts, TrainingStage::Examples);
         shared.observe(progress);
-        shared.is_cancelled
+        if shared.is_cancelled { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
     fn progress(&self, counts: &Counts, stage: TrainingStage) -> TrainingProgress {

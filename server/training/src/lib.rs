@@ -31,10 +31,10 @@ mod tandem;
 mod tie_targets;
 mod tool_path;
 
-pub use accurate::{Accurate, AccurateFailure, AccurateResult, SolveInfo};
+pub use accurate::{Accurate, AccurateFailure, AccurateResult, AccurateSize, SolveInfo};
 pub use atomic_file::{sync_folder, write_atomically, write_json_atomically};
 pub use canonical::{fingerprint, hexadecimal, to_text};
-pub use coarse::{Cancelled, Coarse, CoarseResult, Interrupted, Settling};
+pub use coarse::{Coarse, CoarseResult, Interrupted, Settling, SolveObserver};
 pub use database::{
     About, CONTACT_POINT, Database, DatabaseError, DatabaseKind, FORMAT, FORMAT_VERSION, METADATA_KEY, SOLVER_VERSION,
     TANDEM_VERSION, versions,

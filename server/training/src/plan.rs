@@ -11,7 +11,7 @@ use crate::recorded;
 use crate::setup::{Approach, FeatureScales, InteractionSet, PressRanges, Setup, Source};
 use plica_geometry::{ReferenceSkin, SurfacePoint};
 
-/// Points that are tried before a region counts as one that the skin does not meet.
+/// Points drawn before a region counts as free of skin.
 const MAX_TRIES: usize = 10_000;
 /// Skin whose normal is turned this far against the approach faces the tool (cosine).
 const FACING: f64 = 0.2;
@@ -24,7 +24,7 @@ pub fn plan(setup: &Setup, sets: &[InteractionSet], seed: u64) -> Result<Vec<Int
     let skin = ReferenceSkin::new(&setup.coarse.skin);
     let mut all = Vec::new();
     for (index, set) in sets.iter().enumerate() {
-        all.extend(draw_set(setup, &skin, set, (seed, index as u32))?);
+        all.extend(draw_set(setup, &skin, set, seed, index as u32)?);
     }
     Ok(all)
 }
@@ -33,14 +33,15 @@ fn draw_set(
     setup: &Setup,
     skin: &ReferenceSkin,
     set: &InteractionSet,
-    (seed, index): (u64, u32),
+    seed: u64,
+    set_index: u32,
 ) -> Result<Vec<Interaction>, PlanError> {
     let n_candidates = set.count * set.candidates_per_example.max(1);
     let candidates = match &set.source {
         Source::Press(ranges) | Source::Lift(ranges) => {
             let region = Region::new(skin, set, ranges)?;
             (0..n_candidates)
-                .map(|i| region.draw(setup, &mut Draws::new(seed, index, i as u32)))
+                .map(|i| region.draw(setup, &mut Draws::new(seed, set_index, i as u32)))
                 .collect::<Result<_, _>>()?
         }
         Source::Recorded(poses) => recorded::candidates(setup, skin, set, poses, seed)?,
@@ -53,7 +54,7 @@ fn draw_set(
     Ok(chosen.into_iter().map(|i| candidates[i].clone()).collect())
 }
 
-/// What makes two interactions alike: `(c / 12 mm, press / 4 mm, drag / 4 mm)` with the default scales.
+/// Features that measure the similarity of interactions: `(c / 12 mm, press / 4 mm, drag / 4 mm)` with the default scales.
 fn features(interaction: &Interaction, scales: &FeatureScales) -> Vec<f64> {
     let (press, drag) = match &interaction.action {
         Action::Press { approach, depth_m, drag_m, .. } => {

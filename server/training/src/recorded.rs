@@ -1,4 +1,4 @@
-//! Interactions from a recorded motion: states picked from it, each with the way there.
+//! Interactions from a recorded motion: states picked from it, each with its tool path.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -11,7 +11,7 @@ use plica_geometry::ReferenceSkin;
 
 /// A pose that overlaps the object at rest by less than this is no press \[m\].
 const LEAST_PRESS_M: f64 = 0.5e-3;
-/// Poses of a way that are closer than this are left out \[m\]; a turn counts as the path of a point at 50 mm.
+/// Poses of a path that are closer than this are left out \[m\]; a turn counts as the path of a point at 50 mm.
 const LEAST_STEP_M: f64 = 0.2e-3;
 const LEVER_M: f64 = 0.05;
 
@@ -72,7 +72,7 @@ fn shuffled(mut items: Vec<usize>, seed: u64) -> Vec<usize> {
     items
 }
 
-/// First, last, and of the poses between those that are a step apart.
+/// First pose, last pose, and poses between them at least a step apart.
 fn thinned(poses: &[Isometry3<f64>]) -> Vec<[f64; 7]> {
     let path = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
         (a.translation.vector - b.translation.vector).norm().max(LEVER_M * a.rotation.angle_to(&b.rotation))

@@ -1,32 +1,32 @@
-//! What a job did: `report.json`. What another machine would find as well stands apart from how long it took here.
+//! Report of a job, `report.json`: results that are the same on every machine, and times of this run.
 
 use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use crate::accurate::SolveInfo;
+use crate::accurate::{AccurateSize, SolveInfo};
 use crate::database::{Database, DatabaseKind};
 use crate::example::{Example, Record, Rejection};
 use crate::setup::Setup;
 use plica_geometry::ReferenceSkin;
 
-/// What a job did.
+/// Report of a job.
 #[derive(Debug, Clone, Serialize)]
 pub struct TrainingReport {
     /// The scene.
     pub scene_hash: String,
-    /// What the examples are for.
+    /// Kind of the database.
     pub kind: DatabaseKind,
     /// Seed of the interactions.
     pub seed: u64,
-    /// The same on every machine, up to rounding.
+    /// Results, the same on every machine up to rounding.
     pub result: Summary,
-    /// Of this run on this machine.
+    /// Times of this run on this machine.
     pub run: Run,
 }
 
-/// Figures that another machine would find as well.
+/// Results, the same on every machine up to rounding.
 #[derive(Debug, Clone, Serialize)]
 pub struct Summary {
     /// Interactions asked for.
@@ -89,7 +89,7 @@ pub struct Spread {
     pub max: f64,
 }
 
-/// How long it took here.
+/// Times of a run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Run {
     /// Threads.
@@ -107,14 +107,8 @@ pub struct Run {
 }
 
 impl TrainingReport {
-    /// Of a finished job; `sizes` are free unknowns and factor values of the accurate model.
-    pub(crate) fn new(
-        setup: &Setup,
-        database: &Database,
-        interactions: usize,
-        (accurate_unknowns, factor_values): (usize, usize),
-        run: Run,
-    ) -> Self {
+    /// Report of a finished job with `interactions` planned interactions.
+    pub(crate) fn new(setup: &Setup, database: &Database, interactions: usize, size: AccurateSize, run: Run) -> Self {
         let examples = &database.examples;
         let records = || examples.iter().map(|e| &e.record);
         let mut kinds = BTreeMap::new();
@@ -127,8 +121,8 @@ impl TrainingReport {
             examples: examples.len(),
             kinds,
             accurate_hexes: setup.accurate.mesh.n_hexes(),
-            accurate_unknowns,
-            factor_values,
+            accurate_unknowns: size.n_unknowns,
+            factor_values: size.n_factor_values,
             tied: Solves::of(records().map(|r| r.tied)),
             independent: Solves::of(records().filter_map(|r| r.independent)),
             settle_s: Spread::of(records().map(|r: &Record| r.settling.time_s)),

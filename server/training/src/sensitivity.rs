@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::accurate::AccurateResult;
+use crate::coarse::SolveObserver;
 use crate::error::TrainingError;
 use crate::interaction::Interaction;
 use crate::plan::plan;
@@ -23,7 +24,7 @@ use plica_geometry::ReferenceSkin;
 /// Vertices with this share of the tie's stiffness or more count as the imprint.
 const HELD: f64 = 0.01;
 
-/// What is varied.
+/// Variations to compare.
 #[derive(Debug, Clone)]
 pub struct Variations {
     /// Interactions.
@@ -36,7 +37,7 @@ pub struct Variations {
     pub independent_on_all_meshes: bool,
 }
 
-/// How far skins differ.
+/// Differences of skins.
 #[derive(Debug, Clone, Serialize)]
 pub struct Sensitivity {
     /// The scene.
@@ -51,10 +52,10 @@ pub struct Sensitivity {
     pub forces: Vec<Force>,
 }
 
-/// How far one skin is from another, over the interactions.
+/// Distance of one skin from another, over the interactions.
 #[derive(Debug, Clone, Serialize)]
 pub struct Difference {
-    /// What is varied.
+    /// Variations to compare.
     pub group: String,
     /// One skin.
     pub of: String,
@@ -69,7 +70,7 @@ pub struct Difference {
 /// Forces over the interactions.
 #[derive(Debug, Clone, Serialize)]
 pub struct Force {
-    /// Of which model.
+    /// Model.
     pub of: String,
     /// Size \[N\].
     pub size_n: Spread,
@@ -101,11 +102,11 @@ pub fn sensitivity(
     let bench = Bench { setup, interactions: &interactions, observer: Mutex::new(observer), pool: &pool };
     let mut left_out = Vec::new();
     let halves = bench.halves(&mut left_out)?;
-    let one = &|tandem: &mut Tandem<'_>, half: &CoarseHalf, _: &Interaction, stop: &(dyn Fn() -> bool + Sync)| {
-        tandem.solve_tied(half, stop)
+    let one = &|tandem: &mut Tandem<'_>, half: &CoarseHalf, _: &Interaction, observer: SolveObserver<'_>| {
+        tandem.solve_tied(half, observer)
     };
-    let own = &|tandem: &mut Tandem<'_>, half: &CoarseHalf, at: &Interaction, stop: &(dyn Fn() -> bool + Sync)| {
-        tandem.solve_independent(at, half, stop)
+    let own = &|tandem: &mut Tandem<'_>, half: &CoarseHalf, at: &Interaction, observer: SolveObserver<'_>| {
+        tandem.solve_independent(at, half, observer)
     };
     let tied = bench.variant("tied", setup, &halves, one, &mut left_out)?;
     let independent = bench.variant("independent", setup, &halves, own, &mut left_out)?;
@@ -139,15 +140,13 @@ pub fn sensitivity(
     Ok(Sensitivity { scene_hash: setup.scene_hash.clone(), interactions: n, left_out, differences, forces })
 }
 
-type Solve<'a> = &'a (
-        dyn Fn(&mut Tandem<'_>, &CoarseHalf, &Interaction, &(dyn Fn() -> bool + Sync)) -> Result<AccurateResult, Stop>
-            + Sync
-    );
+type Solve<'a> =
+    &'a (dyn Fn(&mut Tandem<'_>, &CoarseHalf, &Interaction, SolveObserver<'_>) -> Result<AccurateResult, Stop> + Sync);
 
 /// Called with the name of a variant.
 type Observer<'a> = &'a mut (dyn FnMut(&str) -> ControlFlow<()> + Send);
 
-/// What all variants share.
+/// Inputs of all variants.
 struct Bench<'a> {
     setup: &'a Setup,
     interactions: &'a [Interaction],
@@ -156,16 +155,21 @@ struct Bench<'a> {
 }
 
 impl Bench<'_> {
-    fn is_cancelled(&self, name: &str) -> bool {
+    fn observe(&self, variant: &str) -> ControlFlow<()> {
         let mut observer = self.observer.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        observer(name).is_break()
+        observer(variant)
+    }
+
+    /// Announces a variant.
+    fn begin(&self, variant: &str) -> Result<(), TrainingError> {
+        if self.observe(variant).is_break() { Err(TrainingError::Interrupted) } else { Ok(()) }
     }
 
     fn halves(&self, left_out: &mut Vec<String>) -> Result<Vec<Option<CoarseHalf>>, TrainingError> {
-        let stop = || self.is_cancelled("coarse model");
-        stop();
+        let name = "coarse model";
+        self.begin(name)?;
         let mut tandem = Tandem::new(self.setup)?;
-        let halves = self.interactions.iter().map(|at| tandem.solve_coarse(at, &stop));
+        let halves = self.interactions.iter().map(|at| tandem.solve_coarse(at, &mut || self.observe(name)));
         halves.enumerate().map(|(i, half)| keep("coarse", i, half, left_out)).collect()
     }
 
@@ -177,14 +181,16 @@ impl Bench<'_> {
         solve: Solve<'_>,
         left_out: &mut Vec<String>,
     ) -> Result<Variant, TrainingError> {
-        let stop = || self.is_cancelled(name);
-        stop();
+        self.begin(name)?;
         let per_thread = halves.len().div_ceil(self.pool.current_num_threads()).max(1);
         let solve_chunk = |(first, chunk): (usize, &[Option<CoarseHalf>])| -> Result<Vec<_>, TrainingError> {
             let mut tandem = Tandem::new(setup)?;
             let at = |i: usize| &self.interactions[first * per_thread + i];
             let solved = chunk.iter().enumerate();
-            Ok(solved.map(|(i, half)| half.as_ref().map(|half| solve(&mut tandem, half, at(i), &stop))).collect())
+            let mut observe = || self.observe(name);
+            Ok(solved
+                .map(|(i, half)| half.as_ref().map(|half| solve(&mut tandem, half, at(i), &mut observe)))
+                .collect())
         };
         let chunks: Vec<_> = self.pool.install(|| halves.par_chunks(per_thread).enumerate().map(solve_chunk).collect());
         let mut skins = Vec::with_capacity(halves.len());
@@ -215,6 +221,13 @@ fn keep<T>(
     }
 }
 
+/// Names of two skins, and the group of their difference.
+struct Compared<'a> {
+    group: &'a str,
+    of: &'a str,
+    from: &'a str,
+}
+
 /// Compares skins.
 struct Comparison<'a> {
     tie: &'a TieOptions,
@@ -233,19 +246,19 @@ impl Comparison<'_> {
         let pairs = a.skins.iter().zip(&b.skins).zip(self.halves);
         let skins =
             pairs.filter_map(|((a, b), half)| Some((&a.as_ref()?.offsets, &b.as_ref()?.offsets, half.as_ref()?)));
-        self.difference((group, &a.name, &b.name), skins, in_band)
+        self.difference(Compared { group, of: &a.name, from: &b.name }, skins, in_band)
     }
 
     fn coarse(&self, group: &str, b: &Variant, in_band: bool) -> Option<Difference> {
         let pairs = self.halves.iter().zip(&b.skins);
         let skins =
             pairs.filter_map(|(half, b)| Some((&half.as_ref()?.state.offsets, &b.as_ref()?.offsets, half.as_ref()?)));
-        self.difference((group, "coarse", &b.name), skins, in_band)
+        self.difference(Compared { group, of: "coarse", from: &b.name }, skins, in_band)
     }
 
     fn difference<'b>(
         &self,
-        (group, of, from): (&str, &str, &str),
+        compared: Compared<'_>,
         skins: impl Iterator<Item = (&'b Vec<Vector3<f64>>, &'b Vec<Vector3<f64>>, &'b CoarseHalf)>,
         in_band: bool,
     ) -> Option<Difference> {
@@ -260,9 +273,9 @@ impl Comparison<'_> {
             worst.push(vertices.iter().map(|&v| (a[v] - b[v]).norm()).fold(0.0, f64::max));
         }
         Some(Difference {
-            group: group.to_owned(),
-            of: of.to_owned(),
-            from: from.to_owned(),
+            group: compared.group.to_owned(),
+            of: compared.of.to_owned(),
+            from: compared.from.to_owned(),
             rms_m: Spread::of(rms.into_iter())?,
             worst_m: Spread::of(worst.into_iter())?,
         })

@@ -1,4 +1,4 @@
-//! What training is told, as plain data: the caller has read and checked its configuration.
+//! Set-up of training as plain data, from a configuration that the caller has read and checked.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use plica_accurate::{Material, TieOptions};
@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::canonical::fingerprint;
 use crate::interaction::Interaction;
 
-/// A scene and what to train on it. SI units.
+/// A scene and its interactions. SI units.
 #[derive(Debug, Clone)]
 pub struct Setup {
     /// Names the scene that examples belong to: SHA-256 in hexadecimal digits, made by the caller.
@@ -18,14 +18,14 @@ pub struct Setup {
     pub coarse: ModelDescription,
     /// The accurate model.
     pub accurate: AccurateDescription,
-    /// How the accurate skin is tied to the coarse imprint.
+    /// Tie of the accurate skin to the coarse imprint.
     pub tie: TieOptions,
     /// Direction whose tangential part is the first axis of every contact frame, and the one that stands in where the first
     /// is normal to the skin.
     pub stamp_axes: [Vector3<f64>; 2],
-    /// How the coarse model is driven.
+    /// Drive of the coarse model.
     pub drive: DriveOptions,
-    /// What the features of farthest-point sampling are divided by.
+    /// Scales of the features of farthest-point sampling.
     pub features: FeatureScales,
     /// Interactions to train on.
     pub training: InteractionSet,
@@ -38,8 +38,7 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Names what is done at an interaction: the scene's hash leaves out how it is driven to and how frames are laid. 64
-    /// hexadecimal digits.
+    /// Digest of an interaction with drive and stamp axes, which the scene hash leaves out; 64 hexadecimal digits.
     pub fn fingerprint(&self, interaction: &Interaction) -> String {
         let axes = self.stamp_axes.map(<[f64; 3]>::from);
         fingerprint(&(interaction, self.drive, axes))
@@ -59,7 +58,7 @@ pub struct AccurateDescription {
     pub fixed: Vec<bool>,
 }
 
-/// How the coarse model is driven to a pose, and when it counts as settled.
+/// Drive of the coarse model to a pose, and criterion of settling.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DriveOptions {
     /// Speed of the tool \[m/s\].
@@ -90,7 +89,7 @@ impl Default for DriveOptions {
     }
 }
 
-/// What the features of farthest-point sampling are divided by.
+/// Scales of the features of farthest-point sampling.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeatureScales {
     /// Contact points \[m\].
@@ -108,7 +107,7 @@ impl Default for FeatureScales {
 /// Name of the set in the trained region, and kind of its examples.
 pub const IN_REGION: &str = "in_region";
 
-/// Interactions that are drawn alike.
+/// Interactions drawn from the same source.
 #[derive(Debug, Clone)]
 pub struct InteractionSet {
     /// Kind of its examples, as the database names it.
@@ -117,13 +116,13 @@ pub struct InteractionSet {
     pub tool: usize,
     /// How many.
     pub count: usize,
-    /// How many are drawn for each one that farthest-point sampling keeps; 1 takes them as they come.
+    /// Candidates drawn for each interaction that farthest-point sampling keeps; 1 keeps all candidates.
     pub candidates_per_example: usize,
-    /// Where they come from.
+    /// Source of the interactions.
     pub source: Source,
 }
 
-/// Where interactions come from.
+/// Source of interactions.
 #[derive(Debug, Clone)]
 pub enum Source {
     /// Drawn at random: the tool presses and drags.

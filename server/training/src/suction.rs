@@ -1,4 +1,4 @@
-//! Suction: what unilateral contact cannot do, the same for both models.
+//! Suction, which unilateral contact cannot exert; the same load for both models.
 //!
 //! A smooth traction along the outward normal `n` at the contact point acts on a disc around it, and keeps its direction:
 //! `t(r) = p (1 - (r / R)^2)^2 n` for `r < R`, `r` the distance on the skin at rest. It is lumped at skin vertices, `f_v =
@@ -7,13 +7,13 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::coarse::{Cancelled, Coarse, CoarseResult, Interrupted};
+use crate::coarse::{Coarse, CoarseResult, Interrupted, SolveObserver};
 use crate::setup::DriveOptions;
 use plica_geometry::{ReferenceSkin, SurfacePoint};
 
 /// Largest error of the height, as a share of it.
 const HEIGHT_TOLERANCE: f64 = 2e-3;
-/// Loads that are tried.
+/// Loads tried at most.
 const MAX_TRIES: u32 = 12;
 /// Vertices whose normal leans farther than this from the disc's are on another face (cosine).
 const SAME_FACE: f64 = 0.7;
@@ -52,36 +52,49 @@ impl Disc {
 pub(crate) struct Lifted {
     /// The state.
     pub state: CoarseResult,
-    /// Forces at skin vertices that hold it, `[n_skin]` \[N\].
+    /// Forces of the suction at skin vertices, `[n_skin]` \[N\].
     pub skin_forces: Vec<Vector3<f64>>,
     /// Height reached \[m\].
     pub height_m: f64,
-    /// Whether it is the height asked for.
+    /// Whether the target height was reached.
     pub reached: bool,
 }
 
-/// From rest: finds the suction that raises the coarse skin at `at` by `height_m`. `modulus_pa` sets the first guess.
+/// Where and how far suction raises the coarse skin.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LiftTarget<'a> {
+    /// Disc under the suction.
+    pub disc: &'a Disc,
+    /// Point of the skin that is raised.
+    pub at: &'a SurfacePoint,
+    /// Height \[m\].
+    pub height_m: f64,
+    /// Young's modulus for the first guess of the pressure \[Pa\].
+    pub young_modulus_pa: f64,
+}
+
+/// From rest: finds the suction that reaches `target`.
 ///
 /// # Errors
 /// [`Interrupted`].
 pub(crate) fn lift(
     coarse: &mut Coarse,
     skin: &ReferenceSkin,
-    (disc, at): (&Disc, &SurfacePoint),
-    (height_m, modulus_pa): (f64, f64),
+    target: LiftTarget<'_>,
     drive: &DriveOptions,
-    cancelled: Cancelled<'_>,
+    observer: SolveObserver<'_>,
 ) -> Result<Lifted, Interrupted> {
+    let LiftTarget { disc, at, height_m, young_modulus_pa } = target;
     coarse.restart();
     let unit = disc.unit_forces(skin);
     let unit_nodal = coarse.model().description().embedding.apply_transpose(&unit);
     // A stiff guess, F = 8/3 E R h with F = p R^2 pi / 3: what a rigid disc on a half-space of nu = 1/2 takes. The true skin is
     // softer or stiffer by some factor, which the next tries find.
-    let mut pressure_pa = 8.0 / std::f64::consts::PI * modulus_pa * height_m / disc.radius_m;
+    let mut pressure_pa = 8.0 / std::f64::consts::PI * young_modulus_pa * height_m / disc.radius_m;
     let mut tries = 0;
     loop {
         let forces: Vec<_> = unit_nodal.iter().map(|f| f * pressure_pa).collect();
-        let state = coarse.load(&forces, drive, cancelled)?;
+        let state = coarse.load(&forces, drive, observer)?;
         let reached_m = skin.interpolate(at, &state.offsets).dot(&disc.normal);
         tries += 1;
         let reached = (reached_m - height_m).abs() <= HEIGHT_TOLERANCE * height_m;

@@ -5,13 +5,13 @@ use plica_accurate::contact::Obstacle;
 use plica_accurate::{Tie, TieTarget};
 
 use crate::accurate::{Accurate, AccurateFailure, AccurateResult, SolveInfo};
-use crate::coarse::{Cancelled, Coarse, CoarseResult, Interrupted};
+use crate::coarse::{Coarse, CoarseResult, Interrupted, SolveObserver};
 use crate::error::BuildError;
 use crate::example::{Example, Outcome, Reason, Record, Rejection, difference, numbers, rows, to_f32};
 use crate::interaction::{Action, Interaction, to_numbers};
 use crate::obstacle::obstacle;
 use crate::setup::Setup;
-use crate::suction::{Disc, lift};
+use crate::suction::{Disc, LiftTarget, lift};
 use crate::tie_targets::{around_tool, under_disc};
 use crate::tool_path::ToolPath;
 use plica_geometry::{ReferenceSkin, SurfacePoint};
@@ -19,7 +19,7 @@ use plica_geometry::{ReferenceSkin, SurfacePoint};
 /// A result with an element below this `det F` is not stored.
 pub const SMALLEST_JACOBIAN: f64 = 0.05;
 
-/// Both models of a scene, and what one thread needs to solve interactions.
+/// Both models of a scene, with the memory of one thread.
 pub struct Tandem<'a> {
     setup: &'a Setup,
     skin: ReferenceSkin,
@@ -35,27 +35,27 @@ pub struct CoarseHalf {
     pub state: CoarseResult,
     /// Contact point on the reference skin.
     pub contact: SurfacePoint,
-    /// Where the tool is.
+    /// Pose of the tool.
     pub pose: Isometry3<f64>,
     /// Skin vertices in the contact band.
     pub targets: Vec<TieTarget>,
-    /// What acts on the object.
+    /// Load on the object.
     pub load: Load,
 }
 
-/// What acts on the object.
+/// Load on the object.
 #[derive(Debug, Clone)]
 pub enum Load {
-    /// A tool after this path.
+    /// A tool at the end of its path.
     Tool(ToolPath),
     /// Forces at skin vertices, `[n_skin]` \[N\].
     Suction(Vec<nalgebra::Vector3<f64>>),
 }
 
-/// Why there is no half.
+/// Why an interaction has no result.
 #[derive(Debug)]
 pub enum Stop {
-    /// Asked to stop.
+    /// Ended by the observer.
     Interrupted,
     /// The interaction is rejected.
     Rejected(Reason, String),
@@ -118,9 +118,9 @@ impl<'a> Tandem<'a> {
         index: u32,
         interaction: &Interaction,
         with_independent: bool,
-        cancelled: Cancelled<'_>,
+        observer: SolveObserver<'_>,
     ) -> Result<Outcome, Interrupted> {
-        match self.try_solve(index, interaction, with_independent, cancelled) {
+        match self.try_solve(index, interaction, with_independent, observer) {
             Ok(example) if example.is_finite() => Ok(Outcome::Accepted(Box::new(example))),
             Ok(_) => Ok(self.rejected(index, interaction, Reason::NotFinite, "a number of it is not finite".into())),
             Err(Stop::Rejected(reason, message)) => Ok(self.rejected(index, interaction, reason, message)),
@@ -129,8 +129,16 @@ impl<'a> Tandem<'a> {
     }
 
     fn rejected(&self, index: u32, interaction: &Interaction, reason: Reason, message: String) -> Outcome {
-        let fingerprint = self.setup.fingerprint(interaction);
-        Outcome::Rejected(Rejection::new((index, fingerprint), interaction, reason, message))
+        Outcome::Rejected(Rejection {
+            index,
+            kind: interaction.kind.clone(),
+            reason,
+            message,
+            contact_point_m: interaction.contact_point_m,
+            depth_m: interaction.depth_m(),
+            drag_m: interaction.drag().into(),
+            interaction_sha256: self.setup.fingerprint(interaction),
+        })
     }
 
     fn try_solve(
@@ -138,12 +146,12 @@ impl<'a> Tandem<'a> {
         index: u32,
         interaction: &Interaction,
         with_independent: bool,
-        cancelled: Cancelled<'_>,
+        observer: SolveObserver<'_>,
     ) -> Result<Example, Stop> {
-        let half = self.solve_coarse(interaction, cancelled)?;
-        let tied = self.solve_tied(&half, cancelled)?;
+        let half = self.solve_coarse(interaction, observer)?;
+        let tied = self.solve_tied(&half, observer)?;
         let independent =
-            if with_independent { Some(self.solve_independent(interaction, &half, cancelled)?) } else { None };
+            if with_independent { Some(self.solve_independent(interaction, &half, observer)?) } else { None };
         let offsets = &half.state.offsets;
         Ok(Example {
             displacements: half.state.displacements.iter().map(to_f32).collect(),
@@ -174,10 +182,13 @@ impl<'a> Tandem<'a> {
     ///
     /// # Errors
     /// See [`Stop`].
-    pub fn solve_coarse(&mut self, interaction: &Interaction, cancelled: Cancelled<'_>) -> Result<CoarseHalf, Stop> {
+    pub fn solve_coarse(&mut self, interaction: &Interaction, observer: SolveObserver<'_>) -> Result<CoarseHalf, Stop> {
         let half = match &interaction.action {
-            Action::Lift { height_m, radius_m } => self.lift_coarse(interaction, (*height_m, *radius_m), cancelled)?,
-            _ => self.press_coarse(interaction, cancelled)?,
+            Action::Lift { height_m, radius_m } => {
+                let (centre, normal) = (interaction.contact_point(), interaction.normal());
+                self.lift_coarse(&Disc { centre, normal, radius_m: *radius_m }, *height_m, observer)?
+            }
+            _ => self.press_coarse(interaction, observer)?,
         };
         let settling = &half.state.settling;
         if settling.rollbacks > 0 {
@@ -194,11 +205,11 @@ impl<'a> Tandem<'a> {
         Ok(half)
     }
 
-    fn press_coarse(&mut self, interaction: &Interaction, cancelled: Cancelled<'_>) -> Result<CoarseHalf, Stop> {
+    fn press_coarse(&mut self, interaction: &Interaction, observer: SolveObserver<'_>) -> Result<CoarseHalf, Stop> {
         let (tool, setup) = (interaction.tool as usize, self.setup);
         let nothing = || Stop::Rejected(Reason::NothingTouched, "the tool passes the object by".into());
         let path = ToolPath::of(interaction, &self.obstacles[tool], &self.skin).ok_or_else(nothing)?;
-        let state = self.coarse.press(tool, &path, &setup.drive, cancelled)?;
+        let state = self.coarse.press(tool, &path, &setup.drive, observer)?;
         self.under_tool(tool, path, state).ok_or_else(nothing)
     }
 
@@ -219,14 +230,14 @@ impl<'a> Tandem<'a> {
         tool: usize,
         poses: &[Isometry3<f64>],
         mut each: impl FnMut(&mut Self, Option<CoarseHalf>) -> Result<(), Interrupted>,
-        cancelled: Cancelled<'_>,
+        observer: SolveObserver<'_>,
     ) -> Result<(), Interrupted> {
         let drive = self.setup.drive;
         for (i, pose) in poses.iter().enumerate() {
             let path = ToolPath::new(poses[i.saturating_sub(1)..i].iter().chain([pose]).copied().collect());
             let state = match i {
-                0 => self.coarse.press(tool, &path, &drive, cancelled)?,
-                _ => self.coarse.go_on(tool, &path, &drive, cancelled)?,
+                0 => self.coarse.press(tool, &path, &drive, observer)?,
+                _ => self.coarse.go_on(tool, &path, &drive, observer)?,
             };
             let half = self.under_tool(tool, path, state);
             each(self, half)?;
@@ -234,27 +245,21 @@ impl<'a> Tandem<'a> {
         Ok(())
     }
 
-    fn lift_coarse(
-        &mut self,
-        interaction: &Interaction,
-        (height_m, radius_m): (f64, f64),
-        cancelled: Cancelled<'_>,
-    ) -> Result<CoarseHalf, Stop> {
-        let disc = Disc { centre: interaction.contact_point(), normal: interaction.normal(), radius_m };
+    fn lift_coarse(&mut self, disc: &Disc, height_m: f64, observer: SolveObserver<'_>) -> Result<CoarseHalf, Stop> {
         let contact = self.skin.nearest(&disc.centre);
-        let modulus_pa = self.setup.tie.young_modulus_pa;
-        let target = (height_m, modulus_pa);
-        let lifted = lift(&mut self.coarse, &self.skin, (&disc, &contact), target, &self.setup.drive, cancelled)?;
+        let young_modulus_pa = self.setup.tie.young_modulus_pa;
+        let target = LiftTarget { disc, at: &contact, height_m, young_modulus_pa };
+        let lifted = lift(&mut self.coarse, &self.skin, target, &self.setup.drive, observer)?;
         if !lifted.reached {
             let message = format!("{:.2} mm of {:.2} mm", 1e3 * lifted.height_m, 1e3 * height_m);
             return Err(Stop::Rejected(Reason::HeightNotReached, message));
         }
         let mut state = lifted.state;
         state.tool_force = -lifted.skin_forces.iter().sum::<nalgebra::Vector3<f64>>();
-        let targets = under_disc(&self.skin, &state.offsets, &disc, &self.setup.tie);
+        let targets = under_disc(&self.skin, &state.offsets, disc, &self.setup.tie);
         // The tool only marks the place: its axis along the normal, its tip where the skin was raised to.
         let turned = crate::interaction::rotation(crate::interaction::orientation(&-disc.normal));
-        let raised = disc.centre + disc.normal * (lifted.height_m + radius_m);
+        let raised = disc.centre + disc.normal * (lifted.height_m + disc.radius_m);
         let pose = Isometry3::from_parts(raised.coords.into(), turned);
         Ok(CoarseHalf { contact, pose, targets, load: Load::Suction(lifted.skin_forces), state })
     }
@@ -263,14 +268,14 @@ impl<'a> Tandem<'a> {
     ///
     /// # Errors
     /// See [`Stop`].
-    pub fn solve_tied(&mut self, half: &CoarseHalf, cancelled: Cancelled<'_>) -> Result<AccurateResult, Stop> {
+    pub fn solve_tied(&mut self, half: &CoarseHalf, observer: SolveObserver<'_>) -> Result<AccurateResult, Stop> {
         let tie = Tie::new(self.accurate.embedding(), &half.targets, &self.setup.tie);
-        let result = self.accurate.tied(&tie, cancelled);
+        let result = self.accurate.tied(&tie, observer);
         accept(result, Reason::TiedNotConverged, Reason::TiedInverted)
     }
 
-    /// The accurate model under the tool itself, or under the same suction: nothing is taken from the coarse model but the
-    /// pressure that raised it.
+    /// The accurate model under the tool itself, or under the same suction: only the pressure of the suction is taken from the
+    /// coarse model.
     ///
     /// # Errors
     /// See [`Stop`].
@@ -278,13 +283,13 @@ impl<'a> Tandem<'a> {
         &mut self,
         interaction: &Interaction,
         half: &CoarseHalf,
-        cancelled: Cancelled<'_>,
+        observer: SolveObserver<'_>,
     ) -> Result<AccurateResult, Stop> {
         let tool = interaction.tool as usize;
         let friction = self.setup.coarse.tools[tool].friction;
         let result = match &half.load {
-            Load::Suction(forces) => self.accurate.loaded(forces, cancelled),
-            Load::Tool(path) => self.accurate.pressed(&self.obstacles[tool], friction, path, cancelled),
+            Load::Suction(forces) => self.accurate.loaded(forces, observer),
+            Load::Tool(path) => self.accurate.pressed(&self.obstacles[tool], friction, path, observer),
         };
         accept(result, Reason::IndependentNotConverged, Reason::IndependentInverted)
     }

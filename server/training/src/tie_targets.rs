@@ -1,4 +1,4 @@
-//! The contact region: which skin vertices tie the accurate model to the coarse imprint, and how firmly.
+//! Contact region: skin vertices that tie the accurate model to the coarse imprint, with their gaps.
 
 use nalgebra::{Isometry3, Vector3};
 use plica_accurate::contact::Obstacle;
@@ -19,8 +19,8 @@ pub(crate) fn around_tool(
     targets(skin, offsets, tie, |_, position| obstacle.distance(pose, &(*position).into()))
 }
 
-/// Vertices of the disc that suction acts on. Its rim stands for the rim of the contact band: the last `band_m` of the
-/// radius count as gap.
+/// Vertices of the disc under suction. The outer `band_m` of the disc is treated as a gap, so that the tie ramps down as it does
+/// around a tool.
 pub(crate) fn under_disc(
     skin: &ReferenceSkin,
     offsets: &[Vector3<f64>],

@@ -4,7 +4,6 @@
 mod common;
 
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use plica_training::evaluation::*;
 use plica_training::*;
@@ -26,7 +25,7 @@ fn train(setup: &Setup, kind: DatabaseKind) -> Database {
     Database::read(&folder.path().join("database.safetensors"), Some(&setup.scene_hash)).unwrap()
 }
 
-/// More examples than the other tests of training need: 20, and 10 to judge by.
+/// More examples than the other tests of training need: 20, and 10 held out.
 fn setup() -> Setup {
     let mut setup = common::tiny();
     setup.training.count = 20;
@@ -36,33 +35,33 @@ fn setup() -> Setup {
 }
 
 #[test]
-fn every_method_is_judged_by_the_same_states() {
+fn every_method_is_evaluated_on_the_same_states() {
     let setup = setup();
     let (training, held_out) = (train(&setup, DatabaseKind::Training), train(&setup, DatabaseKind::Evaluation));
     let n_examples = training.examples.len();
     assert!(n_examples >= 18, "{:?}", training.rejected);
-    let judge = Judge::new(&setup, &training, &held_out).unwrap();
-    assert_eq!((judge.n_states(), judge.n_left_out(), judge.n_examples()), ([6, 4], 0, n_examples));
+    let evaluator = Evaluator::new(&setup, &training, &held_out).unwrap();
+    assert_eq!((evaluator.n_states(), evaluator.n_left_out(), evaluator.n_examples()), ([6, 4], 0, n_examples));
     let methods = methods(setup.stamp_axes);
     let mut parts = Vec::new();
-    let found = evaluate(&judge, &methods, usize::MAX, &mut |progress| {
+    let found = evaluate(&evaluator, &methods, usize::MAX, &mut |progress| {
         parts.push((progress.done, progress.all));
         ControlFlow::Continue(())
     });
     let found = found.unwrap();
     for m in &found.methods {
-        let (v, outside) = (&m.verdict, m.verdict.outside.unwrap());
+        let (v, outside) = (&m.evaluation, m.evaluation.outside.unwrap());
         println!(
             "{:26} {:.3} {:.3} | {:.3} {:.3}",
             v.name, v.in_region.median, v.in_region.worst, outside.median, outside.worst
         );
     }
 
-    let names: Vec<&str> = found.methods.iter().map(|m| m.verdict.name.as_str()).collect();
+    let names: Vec<&str> = found.methods.iter().map(|m| m.evaluation.name.as_str()).collect();
     let expected: Vec<&str> = std::iter::once(COARSE).chain(methods.iter().map(|m| m.name.as_str())).collect();
     assert_eq!(names, expected);
     for m in &found.methods {
-        let v = &m.verdict;
+        let v = &m.evaluation;
         assert_eq!((v.in_region.states, v.near_contact.states, v.outside.unwrap().states), (6, 6, 4), "{}", v.name);
         assert_eq!(
             v.kinds.iter().map(|(k, g)| (k.as_str(), g.states)).collect::<Vec<_>>(),
@@ -72,13 +71,13 @@ fn every_method_is_judged_by_the_same_states() {
         assert!(q.median <= q.p95 && q.p95 <= q.worst && q.worst.is_finite(), "{}: {q:?}", v.name);
         assert!(q.independent_median_mm.unwrap() > 0.0 && q.median_mm > 0.0);
     }
-    let of = |name: &str| found.methods.iter().find(|m| m.verdict.name == name).unwrap();
-    let coarse = &of(COARSE).verdict;
+    let of = |name: &str| found.methods.iter().find(|m| m.evaluation.name == name).unwrap();
+    let coarse = &of(COARSE).evaluation;
     assert_eq!((coarse.in_region.median, coarse.in_region.worst, coarse.outside.unwrap().worst), (1.0, 1.0, 1.0));
     // A lift or a side press looks like no example: the paper's kernel is zero there, and nothing is added.
-    let outside = of("ssh12-vector").verdict.outside.unwrap();
+    let outside = of("ssh12-vector").evaluation.outside.unwrap();
     assert_eq!((outside.median, outside.worst), (1.0, 1.0));
-    assert!(of(DEFAULT_METHOD).verdict.in_region.median < 0.6);
+    assert!(of(DEFAULT_METHOD).evaluation.in_region.median < 0.6);
 
     let default = of(DEFAULT_METHOD).degenerate.as_ref().unwrap();
     assert_eq!(default.at_rest.worst, 0.0, "no deformation, no detail");
@@ -90,7 +89,7 @@ fn every_method_is_judged_by_the_same_states() {
     assert_eq!(counts, [(DEFAULT_METHOD, 16), ("ridge-vector", 16), ("ssh12-blend", 16)]);
     let n = methods.len() + 3;
     assert_eq!(parts, (0..n).map(|i| (i, n)).collect::<Vec<_>>());
-    let stopped = evaluate(&judge, &methods, usize::MAX, &mut |_| ControlFlow::Break(())).unwrap_err().to_string();
+    let stopped = evaluate(&evaluator, &methods, usize::MAX, &mut |_| ControlFlow::Break(())).unwrap_err().to_string();
     assert!(stopped.contains("interrupted"), "{stopped}");
 }
 
@@ -104,15 +103,15 @@ fn databases_of_another_model_and_empty_regions_are_refused() {
     let (training, held_out) = (train(&small, DatabaseKind::Training), train(&small, DatabaseKind::Evaluation));
     let mut cut = held_out.clone();
     cut.examples[1].detail.pop();
-    let message = Judge::new(&setup, &training, &cut).err().unwrap().to_string();
+    let message = Evaluator::new(&setup, &training, &cut).err().unwrap().to_string();
     assert!(message.contains("held-out example 1") && message.contains("skin vertices"), "{message}");
     let mut outside = held_out.clone();
     outside.examples.retain(|e| e.record.kind != IN_REGION);
-    let message = Judge::new(&setup, &training, &outside).err().unwrap().to_string();
+    let message = Evaluator::new(&setup, &training, &outside).err().unwrap().to_string();
     assert!(message.contains("none of 2 held-out examples"), "{message}");
-    let judge = Judge::new(&setup, &training, &held_out).unwrap();
+    let evaluator = Evaluator::new(&setup, &training, &held_out).unwrap();
     let default = &methods(setup.stamp_axes)[0];
-    let message = judge.judge(default, 1).err().unwrap().to_string();
+    let message = evaluator.evaluate(default, 1).err().unwrap().to_string();
     assert!(message.contains("kriging-stamp") && message.contains("at least 2"), "{message}");
 }
 
@@ -122,13 +121,16 @@ fn another_coarse_model_is_compared_with_the_same_accurate_skins() {
     let mut setup = setup();
     setup.training.count = 2;
     let (training, held_out) = (train(&setup, DatabaseKind::Training), train(&setup, DatabaseKind::Evaluation));
-    let coarse = Judge::new(&setup, &training, &held_out).unwrap().coarse().unwrap();
-    let told = AtomicUsize::new(0);
-    let done = || {
-        told.fetch_add(1, Relaxed);
-    };
-    let own = other_coarse(&setup, &held_out, &setup, 2, (&done, &|| false)).unwrap();
-    assert_eq!((own.states, own.failed, told.load(Relaxed)), (6, 0, 6));
+    let coarse = Evaluator::new(&setup, &training, &held_out).unwrap().coarse().unwrap();
+    let mut progress = Vec::new();
+    let own = other_coarse(&setup, &held_out, &setup, 2, &mut |p| {
+        progress.push((p.done, p.all));
+        ControlFlow::Continue(())
+    });
+    let own = own.unwrap();
+    assert_eq!((own.states, own.failed), (6, 0));
+    progress.dedup();
+    assert_eq!(progress, (0..=6).map(|i| (i, 6)).collect::<Vec<_>>());
     let expected = coarse.in_region.independent_mm.unwrap();
     assert!((own.independent_mm.median - expected.median).abs() < 1e-5, "{own:?} {expected:?}");
     assert!((own.independent_mm.worst - expected.worst).abs() < 1e-5, "{own:?} {expected:?}");
@@ -144,14 +146,15 @@ fn another_coarse_model_is_compared_with_the_same_accurate_skins() {
         coarse: plica_sim::ModelDescription { skin: setup.coarse.skin.clone(), ..finer.coarse },
         ..setup.clone()
     };
-    let found = other_coarse(&setup, &held_out, &finer, 1, (&|| {}, &|| false)).unwrap();
+    let found = other_coarse(&setup, &held_out, &finer, 1, &mut |_| ControlFlow::Continue(())).unwrap();
     println!("{own:?} {found:?}");
     assert!(found.independent_mm.median < 0.8 * own.independent_mm.median);
 
     let elsewhere = Setup { evaluation_seed: 9, drive: DriveOptions { window_s: 0.2, ..setup.drive }, ..setup.clone() };
-    let message = other_coarse(&elsewhere, &held_out, &setup, 1, (&|| {}, &|| false)).unwrap_err().to_string();
+    let message =
+        other_coarse(&elsewhere, &held_out, &setup, 1, &mut |_| ControlFlow::Continue(())).unwrap_err().to_string();
     assert!(message.contains("another interaction"), "{message}");
-    let stopped = other_coarse(&setup, &held_out, &setup, 1, (&|| {}, &|| true)).unwrap_err().to_string();
+    let stopped = other_coarse(&setup, &held_out, &setup, 1, &mut |_| ControlFlow::Break(())).unwrap_err().to_string();
     assert!(stopped.contains("interrupted"), "{stopped}");
 }
 
@@ -161,9 +164,9 @@ fn a_slide_is_smooth_where_the_accurate_solution_is() {
     setup.evaluation.truncate(1);
     setup.evaluation[0].count = 1;
     let (training, held_out) = (train(&setup, DatabaseKind::Training), train(&setup, DatabaseKind::Evaluation));
-    let judge = Judge::new(&setup, &training, &held_out).unwrap();
+    let evaluator = Evaluator::new(&setup, &training, &held_out).unwrap();
     let chosen: Vec<Method> = methods(setup.stamp_axes).into_iter().filter(|m| m.name != "rbf-vector").collect();
-    let found = slide(&setup, &judge, &chosen, usize::MAX, &mut |_| ControlFlow::Continue(())).unwrap();
+    let found = slide(&setup, &evaluator, &chosen, usize::MAX, &mut |_| ControlFlow::Continue(())).unwrap();
     println!("{} states, {} rejected, {:?}", found.states, found.rejected, found.accurate);
     found.methods.iter().for_each(|m| println!("{:26} {:?} {:?}", m.name, m.roughness, m.error));
     // 16 mm to go at most, and the way down and up.
@@ -175,6 +178,7 @@ fn a_slide_is_smooth_where_the_accurate_solution_is() {
         default.roughness.max_mm < 2.0 * found.accurate.max_mm,
         "no jump that the accurate solution knows nothing of"
     );
-    let stopped = slide(&setup, &judge, &chosen, usize::MAX, &mut |_| ControlFlow::Break(())).unwrap_err().to_string();
+    let stopped =
+        slide(&setup, &evaluator, &chosen, usize::MAX, &mut |_| ControlFlow::Break(())).unwrap_err().to_string();
     assert!(stopped.contains("interrupted"), "{stopped}");
 }

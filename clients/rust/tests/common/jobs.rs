@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 use plica_client::protocol::chunk::{ChunkHeader, offset_of, piece};
 use plica_client::protocol::jobs::{
-    Job, JobFetchRequest, JobKind, JobListReply, JobRequest, JobState, JobSubmitReply, JobSubmitRequest, Progress,
+    Job, JobFetchRequest, JobKind, JobListReply, JobProgress, JobRequest, JobState, JobSubmitReply, JobSubmitRequest,
 };
 use plica_client::protocol::rpc::{ErrorCode, ErrorReply, Method, decode_request};
 use serde_json::Value;
@@ -42,7 +42,7 @@ fn job(id: &str, state: JobState) -> Job {
         reason: (state == JobState::Failed).then(|| "exit code 1: disk full".to_owned()),
         started_unix_s: None,
         finished_unix_s: None,
-        progress: Progress { done, total: 8, seconds_left: Some(12.0), ..Progress::default() },
+        progress: JobProgress { done, total: 8, seconds_left: Some(12.0), ..JobProgress::default() },
     }
 }
 

@@ -1,4 +1,4 @@
-//! `rpc/activate`: makes examples ready on a thread of its own, which takes seconds, then lets the simulation change to them.
+//! `rpc/activate`: prepares examples on a thread of its own, which takes seconds, then commands the simulation to use them.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -17,11 +17,11 @@ use super::requests::{Activation, Request, refused};
 use super::shared::{Shared, spawn};
 use crate::database_loader::Ready;
 
-/// Requests that may wait: none but the next.
+/// Requests that may wait: one.
 const QUEUE: usize = 1;
 const LOOK_AT_STOP: Duration = Duration::from_millis(100);
 
-/// Starts the thread; what goes into the channel comes out of `orders` once it is ready.
+/// Starts the thread; requests in the channel are sent to `orders` once their examples are prepared.
 pub(super) fn start(
     shared: &Arc<Shared>,
     orders: SyncSender<Request>,
@@ -66,7 +66,7 @@ impl Worker {
         let payload = query.payload().map(|p| p.to_bytes()).unwrap_or_default();
         let request: ActivateRequest = decode_request(&payload)?;
         let path = self.path(&request)?;
-        // What a database holds must not end the thread.
+        // A panic over the content of a database must not end the thread.
         let ready = catch_unwind(AssertUnwindSafe(|| self.shared.enrichment.read(&path)));
         let ready = ready.map_err(|_| ErrorReply::new(ErrorCode::Internal, "the examples could not be made ready"))?;
         ready.map_err(|error| {
@@ -83,7 +83,7 @@ impl Worker {
     }
 }
 
-/// A job is named by its id: where the daemon keeps it is nobody's business.
+/// Replaces the path of a job by its id, so that the daemon's folders stay private.
 fn shown(message: &str, path: &Path, job: Option<&str>) -> String {
     job.map_or_else(|| message.to_owned(), |id| message.replace(&path.display().to_string(), &format!("job {id}")))
 }

@@ -8,9 +8,9 @@ pub enum BusError {
         "cannot listen on {endpoint}: the address is in use{owner}; stop that program, or choose another address with --listen"
     )]
     AddressInUse {
-        /// What was asked for.
+        /// Requested endpoint.
         endpoint: String,
-        /// Who has it, as far as can be seen.
+        /// Process that holds it, if visible.
         owner: String,
     },
     /// The configuration file cannot be used.
@@ -18,7 +18,7 @@ pub enum BusError {
     Config {
         /// The file.
         file: String,
-        /// What Zenoh said.
+        /// Error of Zenoh.
         problem: String,
     },
     /// The session name cannot be part of a key.
@@ -30,12 +30,12 @@ pub enum BusError {
         /// The other one.
         other: String,
     },
-    /// Anything else that Zenoh says.
+    /// Any other error of Zenoh.
     #[error("the bus cannot be opened on {endpoint}: {problem}")]
     Zenoh {
-        /// What was asked for.
+        /// Requested endpoint.
         endpoint: String,
-        /// What Zenoh said.
+        /// Error of Zenoh.
         problem: String,
     },
     /// A thread cannot be started.

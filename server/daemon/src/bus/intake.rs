@@ -14,7 +14,7 @@ use super::scene_info::SceneInfo;
 use crate::realtime::MAX_STEP_POSES;
 use crate::wire;
 
-/// Poses on their way to the simulation thread.
+/// Gates and queues of poses for the simulation thread.
 pub(super) struct PoseIntake {
     names: Vec<String>,
     tools: Vec<Mutex<Tool>>,
@@ -40,7 +40,7 @@ impl PoseIntake {
         self.names.iter().position(|n| n == name)
     }
 
-    /// A message has arrived for a tool.
+    /// Handles a message for a tool.
     pub(super) fn arrive(&self, tool: usize, message: Result<Pose, DecodeError>) {
         let now_s = self.now_s();
         let mut tool = self.lock(tool);
@@ -50,7 +50,7 @@ impl PoseIntake {
         }
     }
 
-    /// The poses of a step request: all of them, or the error of the first that is refused and nothing has changed.
+    /// Accepts the poses of a step request: all of them, or none and the error of the first refused one.
     pub(super) fn take_for_step(&self, poses: &[StepPose]) -> Result<Vec<ToolPose>, ErrorReply> {
         if poses.len() > MAX_STEP_POSES {
             let message = format!("{} poses; at most {MAX_STEP_POSES} fit into one step", poses.len());
@@ -73,7 +73,7 @@ impl PoseIntake {
         Ok(taken)
     }
 
-    /// Forgets who held which tool.
+    /// Forgets the sources that hold tools.
     pub(super) fn forget(&self) {
         (0..self.tools.len()).for_each(|tool| self.lock(tool).gate.forget());
     }

@@ -1,5 +1,5 @@
-//! Methods about jobs, and their progress: on a thread of their own, so that a large scene or result holds up no order
-//! to the simulation.
+//! Methods of jobs, and their progress, on a thread of their own, so that a large scene or result delays no command to the
+//! simulation.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -7,7 +7,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use plica_protocol::chunk::offset_of;
-use plica_protocol::jobs::{JobFetchRequest, JobProgress, JobRequest, MAX_REQUEST_BYTES};
+use plica_protocol::jobs::{JobFetchRequest, JobProgressMessage, JobRequest, MAX_REQUEST_BYTES};
 use plica_protocol::rpc::{EmptyRequest, ErrorCode, ErrorReply, Method, decode_request};
 use plica_protocol::{ENCODING_BYTES, ENCODING_JSON};
 use zenoh::Wait;
@@ -23,7 +23,7 @@ use super::shared::{Shared, spawn};
 
 /// Requests that may wait.
 const QUEUE: usize = 16;
-/// How often progress is published while it changes.
+/// Interval of progress messages.
 const PERIOD: Duration = Duration::from_millis(200);
 
 /// Starts the thread; what goes into the channel is answered.
@@ -37,7 +37,7 @@ pub(super) fn start(shared: &Arc<Shared>, replies: Replies) -> Result<(SyncSende
         .encoding(Encoding::from(ENCODING_JSON))
         .wait()
         .map_err(|e| shared.error(e))?;
-    // What an earlier daemon has left is no news.
+    // Jobs of an earlier daemon are not published.
     let (published, _) = shared.jobs.changed_since(0);
     let worker = Worker { shared: Arc::clone(shared), replies, requests, publisher, published };
     Ok((requests_in, spawn("plica-jobs", move || worker.run())?))
@@ -48,7 +48,7 @@ struct Worker {
     replies: Replies,
     requests: Receiver<Query>,
     publisher: Publisher<'static>,
-    /// Version of the jobs that everybody has heard of.
+    /// Version of the jobs that was published last.
     published: u64,
 }
 
@@ -68,11 +68,11 @@ impl Worker {
         }
     }
 
-    /// One message for each job that has changed, with what is true now.
+    /// Publishes the present state of each job that has changed.
     fn publish(&mut self) {
         let (version, changed) = self.shared.jobs.changed_since(self.published);
         self.published = version;
-        for progress in changed.iter().map(JobProgress::from) {
+        for progress in changed.iter().map(JobProgressMessage::from) {
             let Ok(message) = json(&progress) else { continue };
             // Dropped where it does not fit into the queue at once; an error means that the session is closing.
             let _ = self.publisher.put(message).wait();

@@ -1,4 +1,4 @@
-//! Answers questions for the mesh, piece by piece.
+//! Answers queries for the mesh, in chunks.
 
 use std::sync::Arc;
 

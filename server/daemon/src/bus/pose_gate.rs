@@ -1,4 +1,4 @@
-//! What one tool makes of the messages that arrive for it: which count, and which are counted. No bus, no clock.
+//! Gate of one tool's poses: accepts or refuses them, and counts both. No bus, no clock.
 
 use plica_protocol::DecodeError;
 use plica_protocol::order::{Refusal, SourceOrder};
@@ -21,7 +21,7 @@ impl PoseGate {
         Self { stale_after_s, ..Self::default() }
     }
 
-    /// The pose, if it counts; else it is counted by kind.
+    /// Accepts a pose, or counts its refusal by kind.
     pub(super) fn admit(&mut self, arrived: Result<Pose, DecodeError>, now_s: f64) -> Option<Pose> {
         let pose = match arrived {
             Ok(pose) => pose,
@@ -42,7 +42,7 @@ impl PoseGate {
         }
     }
 
-    /// Whether poses would be taken in this order, on a copy of the gate that becomes the gate if all of them are.
+    /// Checks poses in this order on a copy of the gate, which replaces the gate if all of them are accepted.
     pub(super) fn try_take(&mut self, pose: &Pose, now_s: f64) -> Result<(), Refusal> {
         self.order.take(pose, now_s, self.stale_after_s)?;
         self.accepted += 1;
@@ -53,13 +53,13 @@ impl PoseGate {
         count(&mut self.rejected, kind);
     }
 
-    /// A pose that was admitted is not used after all.
+    /// Undoes the count of an accepted pose that is not used.
     pub(super) fn turn_back(&mut self, kind: &str) {
         self.accepted -= 1;
         self.reject(kind);
     }
 
-    /// The next valid pose of anyone is taken.
+    /// Forgets the source: the next valid pose of any source is accepted.
     pub(super) fn forget(&mut self) {
         self.order.forget();
     }

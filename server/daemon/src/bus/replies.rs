@@ -1,4 +1,4 @@
-//! The thread that answers. A reply waits for a client that does not read, and then only other replies wait with it.
+//! Reply thread: a client that does not read blocks other replies, never a tick.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -25,7 +25,7 @@ pub(super) struct Answer {
     pub(super) content: Result<Content, ErrorReply>,
 }
 
-/// What a question gets.
+/// Content of an answer.
 pub(super) struct Content {
     pub(super) key: String,
     pub(super) payload: Vec<u8>,
@@ -47,7 +47,7 @@ pub(super) struct Replies {
 }
 
 impl Replies {
-    /// Never blocks: when too many answers wait, the question is dropped, counted, and its asker told nothing.
+    /// Never blocks: when too many answers wait, this one is dropped and counted, and its client gets no reply.
     pub(super) fn send(&self, query: Query, content: Result<Content, ErrorReply>) {
         if let Err(error) = &content {
             self.shared.counters.count(&error.code);
@@ -77,7 +77,7 @@ fn run(shared: &Shared, answers: &Receiver<Answer>) {
 
 fn send(answer: Answer) {
     let Answer { query, content } = answer;
-    // An error here means that the asker is gone.
+    // An error means that the client is gone.
     let _ = match content {
         Ok(content) => {
             let reply = query.reply(content.key, content.payload).encoding(Encoding::from(content.encoding));

@@ -1,4 +1,4 @@
-//! Requests on their way between the threads of the bus.
+//! Requests passed between the threads of the bus.
 
 use std::sync::mpsc::TrySendError;
 
@@ -9,9 +9,9 @@ use zenoh::query::Query;
 
 /// A request that waits for the simulation.
 pub(super) enum Request {
-    /// A query as it came.
+    /// A received query.
     Query(Query),
-    /// Examples that are ready.
+    /// Prepared examples.
     Activate(Box<Activation>),
 }
 

@@ -1,5 +1,5 @@
-//! Methods of the simulation: one at a time, on a thread of their own. Those about jobs, and what takes seconds to prepare, are
-//! handed to other threads.
+//! Methods of the simulation, one at a time, on a thread of their own. Methods of jobs and preparations that take seconds are
+//! passed to other threads.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -24,7 +24,7 @@ use crate::wire;
 
 /// Requests that may wait.
 const QUEUE: usize = 16;
-/// How long the simulation may take to obey.
+/// Time-out of a command to the simulation.
 const PATIENCE: Duration = Duration::from_secs(10);
 const LOOK_AT_STOP: Duration = Duration::from_millis(100);
 
@@ -59,7 +59,7 @@ struct Worker {
     port: CommandPort,
     replies: Replies,
     requests: Receiver<Request>,
-    /// Orders whose answer nobody waits for any more.
+    /// Commands whose answers have timed out.
     outstanding: u32,
 }
 
@@ -130,14 +130,14 @@ impl Worker {
             let message = format!("ticks is {}; the allowed range is 0 to {MAX_STEP_TICKS}", request.ticks);
             return Err(ErrorReply::new(ErrorCode::RpcMalformed, message));
         }
-        // A step that will be refused must not use up poses: ask first whether the simulation stands still.
+        // A refused step must not use up poses, so the simulation is first checked to be paused.
         if !self.order(Command::Step { ticks: 0, poses: Vec::new() })?.paused {
             return Err(wire::refusal(crate::realtime::Refusal::NotPaused));
         }
         Ok(Command::Step { ticks: request.ticks, poses: self.shared.intake.take_for_step(&request.poses)? })
     }
 
-    /// Gives an order and waits for the answer.
+    /// Sends a command and waits for the answer.
     fn order(&mut self, command: Command) -> Result<Outcome, ErrorReply> {
         while self.outstanding > 0 && self.port.replies.pop().is_ok() {
             self.outstanding -= 1;

@@ -1,4 +1,4 @@
-//! The scene as far as the bus needs it.
+//! Names, rates and formats of the served scene.
 
 use plica_scene::scene::PublishConfig;
 
@@ -11,7 +11,7 @@ pub struct SceneInfo {
     pub object: String,
     /// Names of the tools, in the model's order.
     pub tools: Vec<String>,
-    /// When each tool is stale \[s\].
+    /// Age at which each tool is stale \[s\].
     pub stale_after_s: Vec<f64>,
     /// Rates and format.
     pub publish: PublishConfig,

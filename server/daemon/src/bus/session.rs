@@ -1,4 +1,4 @@
-//! Opens the Zenoh session: loopback only unless the operator says otherwise.
+//! Opens the Zenoh session, by default on loopback only.
 
 use std::net::TcpListener;
 use std::path::PathBuf;
@@ -12,16 +12,16 @@ use super::error::BusError;
 use super::hearing::{describe, other_daemon};
 use super::port_owner::owner_of_port;
 
-/// What a session is opened with when no file is given.
+/// Built-in Zenoh configuration.
 pub const DEFAULT_ZENOH_CONFIG: &str = include_str!("../../../../configs/zenoh/default.json5");
 
 /// How long another daemon of the same session has to answer before this one begins.
 const OTHER_PATIENCE: Duration = Duration::from_secs(1);
 
-/// Where the daemon is found.
+/// Endpoint and session of the daemon.
 #[derive(Debug, Clone)]
 pub struct BusOptions {
-    /// Endpoint to listen on; `None`: what the configuration says.
+    /// Endpoint to listen on; `None`: the configuration's.
     pub listen: Option<String>,
     /// Name of the session in every key.
     pub session: String,
@@ -100,7 +100,7 @@ fn config(options: &BusOptions) -> Result<Config, BusError> {
     Ok(config)
 }
 
-/// Zenoh's own message does not say who has the port; this one does.
+/// Error of a taken port, with the process that holds it, which Zenoh's own message lacks.
 fn refuse_taken_port(endpoint: &str) -> Result<(), BusError> {
     let Some(address) = endpoint.strip_prefix("tcp/").or(endpoint.strip_prefix("tls/")) else { return Ok(()) };
     match TcpListener::bind(address.split(['?', '#']).next().unwrap_or(address)) {
@@ -112,7 +112,7 @@ fn refuse_taken_port(endpoint: &str) -> Result<(), BusError> {
             );
             Err(BusError::AddressInUse { endpoint: endpoint.into(), owner })
         }
-        // Other errors are Zenoh's to tell.
+        // Other errors keep Zenoh's message.
         _ => Ok(()),
     }
 }

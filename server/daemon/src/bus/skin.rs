@@ -1,4 +1,4 @@
-//! Publishes skin frames at the scene's rate while somebody listens, and answers questions for the newest one.
+//! Publishes skin frames at the scene's rate while a client listens, and answers queries for the newest one.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -27,19 +27,19 @@ use super::wrench::follow_listeners;
 use crate::realtime::{Frame, FramePort};
 use crate::wire;
 
-/// Questions that may wait.
+/// Queries that may wait.
 const QUEUE: usize = 16;
-/// How long a question may wait for a tick.
+/// Longest wait of a query for a tick.
 const PATIENCE: Duration = Duration::from_secs(1);
 const IDLE: Duration = Duration::from_millis(100);
 const WITH_QUESTIONS: Duration = Duration::from_millis(2);
 
-/// What has been published, for the status.
+/// Counters of published frames, for the status.
 #[derive(Debug, Default)]
 pub(super) struct Published {
     /// Frames handed to the bus.
     pub(super) frames: AtomicU64,
-    /// Frames that were due and overwritten before this thread came to them.
+    /// Frames that were due and overwritten before this thread could publish them.
     pub(super) dropped: AtomicU64,
 }
 
@@ -101,7 +101,7 @@ struct Worker {
     due: u64,
 }
 
-/// A question, the number of the request made for it, and when it gives up.
+/// A query, the number of its frame request, and its deadline.
 struct Waiting {
     query: Query,
     number: u64,
@@ -173,7 +173,7 @@ impl Worker {
     }
 }
 
-/// Turns frames into bytes.
+/// Encoder of frames.
 struct Encoder {
     format: PositionFormat,
     surface: DisplaySurface,
@@ -189,7 +189,7 @@ impl Encoder {
         Self { format: shared.scene.publish.format, surface, normals, n_bytes: 0 }
     }
 
-    /// The message; `None` if a position is not finite: the last gate on the way out.
+    /// Encodes a frame; `None` if a position is not finite, the last gate before publishing.
     fn encode(&mut self, frame: &Frame, sequence: u64) -> Option<Vec<u8>> {
         if !frame.positions.iter().flatten().all(|x| x.is_finite()) {
             return None;

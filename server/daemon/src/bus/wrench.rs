@@ -1,4 +1,4 @@
-//! Publishes wrenches: the first in line, on a thread of its own.
+//! Publishes wrenches, with priority over frames, on a thread of its own.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -78,7 +78,7 @@ fn run(shared: &Shared, mut streams: Vec<Stream>) {
 
 impl Stream {
     fn send_all(&mut self) {
-        // As many as are there now: a tool that is always busy does not keep the others waiting.
+        // Only the wrenches present now, so that a busy tool does not delay the others.
         for _ in 0..self.port.wrenches.slots() {
             let Ok(frame) = self.port.wrenches.pop() else { return };
             self.sequence += 1;

@@ -1,6 +1,6 @@
-//! Every so many ticks, where "so many" need not be whole.
+//! Divides the tick rate by a factor that need not be an integer.
 
-/// Says at which ticks something that has its own rate is due.
+/// Schedule of events at a rate of their own, on ticks.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cadence {
     per_tick: f64,
@@ -15,7 +15,7 @@ impl Cadence {
         Self { per_tick, phase: 1.0 - per_tick }
     }
 
-    /// Counts a tick; whether it is due.
+    /// Counts a tick. Returns whether an event is due.
     pub(super) fn advance(&mut self) -> bool {
         self.phase += self.per_tick;
         let due = self.phase >= 1.0;

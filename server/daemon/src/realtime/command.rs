@@ -1,43 +1,43 @@
-//! What the simulation thread can be asked to do, and what it answers.
+//! Commands to the simulation thread, and their answers.
 
 use plica_sim::ToolPose;
 use plica_sim::enrichment::LiveEnrichment;
 
-/// An order, obeyed between ticks.
+/// A command, executed between ticks.
 #[derive(Debug)]
 pub enum Command {
-    /// Rest state, tick 0.
+    /// Returns to the rest state and tick 0.
     Reset,
-    /// Stops.
+    /// Pauses the simulation.
     Pause,
-    /// Goes on.
+    /// Resumes the simulation.
     Resume,
-    /// Runs ticks while stopped. The poses are applied before the first one.
+    /// Runs ticks while paused. Poses are applied before the first tick.
     Step {
-        /// How many.
+        /// Number of ticks.
         ticks: u32,
         /// Poses; the vector travels back in the reply, so that it is freed elsewhere.
         poses: Vec<ToolPose>,
     },
-    /// Keeps the present state.
+    /// Stores the present state.
     Snapshot,
-    /// Returns to a kept state.
+    /// Returns to a stored state.
     Restore {
         /// Number of the snapshot.
         id: u64,
     },
-    /// Enriches with other examples from now on. What did so before travels back in the reply.
+    /// Activates other examples. The former ones travel back in the reply.
     Activate(Box<LiveEnrichment>),
 }
 
-/// Where the simulation stands after an order.
+/// State of the simulation after a command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
     /// Ticks since reset.
     pub tick: u64,
     /// Simulated time \[s\].
     pub sim_time_s: f64,
-    /// Whether it stands still.
+    /// Whether it is paused.
     pub paused: bool,
     /// Number of the snapshot that was taken.
     pub snapshot: Option<u64>,
@@ -45,35 +45,35 @@ pub struct Outcome {
     pub database_generation: u32,
 }
 
-/// Why an order was not obeyed.
+/// Why a command was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
-    /// Steps are for a simulation that stands still.
+    /// Steps require a paused simulation.
     NotPaused,
-    /// In lock-step the simulation never runs by itself.
+    /// In lock-step the simulation cannot be resumed.
     LockStep,
-    /// There is no such snapshot, or it has been overwritten.
+    /// No such snapshot, or overwritten by a newer one.
     UnknownSnapshot,
-    /// Steps of an earlier order are still running.
+    /// Steps of an earlier command still run.
     Busy,
 }
 
-/// Answer to one order.
+/// Answer to one command.
 #[derive(Debug)]
 pub struct Reply {
-    /// What came of it.
+    /// Result.
     pub outcome: Result<Outcome, Refusal>,
-    /// What came with the order or was replaced by it, to be freed by the asker.
+    /// Memory that came with the command or was replaced by it, to be freed by the sender.
     pub returned: Returned,
 }
 
 /// Memory on its way back from the simulation thread.
 #[derive(Debug)]
 pub enum Returned {
-    /// There is none.
+    /// No memory.
     Nothing,
     /// The vector of a [`Command::Step`].
     Poses(Vec<ToolPose>),
-    /// What a [`Command::Activate`] has replaced.
+    /// Enrichment that a [`Command::Activate`] has replaced.
     Enrichment(Option<Box<LiveEnrichment>>),
 }

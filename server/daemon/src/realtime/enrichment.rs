@@ -1,11 +1,11 @@
-//! Detail on the skin, once examples are active.
+//! Enrichment of the skin while examples are active.
 
 use plica_sim::enrichment::LiveEnrichment;
 use plica_sim::{Model, Stage, State};
 
 use super::stage_timer::TurnProbe;
 
-/// What enriches the skin, if anything does.
+/// Active enrichment, if any.
 #[derive(Debug, Default)]
 pub(super) struct Detail {
     live: Option<Box<LiveEnrichment>>,
@@ -18,7 +18,7 @@ impl Detail {
         self.generation
     }
 
-    /// Takes over from what was active, which is returned, so that it is freed elsewhere.
+    /// Activates an enrichment and returns the former one, so that it is freed elsewhere.
     pub(super) fn activate(
         &mut self,
         mut live: Box<LiveEnrichment>,
@@ -33,7 +33,7 @@ impl Detail {
         self.live.replace(live)
     }
 
-    /// Knows the contacts of a state, and none from before it.
+    /// Restarts with the contacts of a state.
     pub(super) fn begin_anew(&mut self, model: &Model, state: &State) {
         if let Some(live) = &mut self.live {
             live.forget();
@@ -69,7 +69,7 @@ impl Detail {
         self.live.as_ref().map_or(0.0, |live| live.confidence(tool))
     }
 
-    /// Least confidence over the tools that touch when a skin was last written; `None` without examples.
+    /// Least confidence over the tools in contact when a skin was last written; `None` without examples.
     pub(super) fn least_confidence(&self) -> Option<f32> {
         self.live.as_ref().map(|live| live.least_confidence())
     }

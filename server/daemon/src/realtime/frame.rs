@@ -1,4 +1,4 @@
-//! What leaves the simulation thread.
+//! Output of the simulation thread.
 
 use plica_sim::{TickReport, ToolReading};
 
@@ -15,19 +15,19 @@ pub struct Frame {
     pub degraded: bool,
     /// Whether the object is at rest and this is a repeat.
     pub sleeping: bool,
-    /// Least confidence over the tools that touch; 0 is the plain coarse skin.
+    /// Least confidence over the tools in contact; 0 is the plain coarse skin.
     pub confidence: f32,
     /// Counts activations of examples; 0: none is active.
     pub database_generation: u32,
     /// World positions `[n_skin]` \[m\].
     pub positions: Vec<[f32; 3]>,
-    /// Counts frames that are due for publishing; a frame made for a question alone keeps the number.
+    /// Counts frames that are due for publishing; a frame made only for a query keeps the number.
     pub due: u64,
-    /// Number of the newest question that this frame answers.
+    /// Number of the newest query that this frame answers.
     pub answers: u64,
 }
 
-/// What one tool feels after a tick.
+/// Force and torque on one tool after a tick.
 #[derive(Debug, Clone, Copy)]
 pub struct ToolFrame {
     /// Ticks since reset.
@@ -36,18 +36,18 @@ pub struct ToolFrame {
     pub sim_time_s: f64,
     /// The tool.
     pub reading: ToolReading,
-    /// Of the enrichment at this tool, when a frame was last made.
+    /// Confidence of the enrichment at this tool, when a frame was last made.
     pub confidence: f32,
 }
 
-/// Where the simulation stands, for the status.
+/// State of the simulation, for the status.
 #[derive(Debug, Clone, Default)]
 pub struct Reading {
     /// Ticks since reset.
     pub tick: u64,
     /// Simulated time \[s\].
     pub sim_time_s: f64,
-    /// Whether it stands still.
+    /// Whether it is paused.
     pub paused: bool,
     /// Times that a state was rolled back.
     pub rollbacks: u64,
@@ -59,7 +59,7 @@ pub struct Reading {
     pub fallbacks: u64,
     /// Contact rows since reset that were found and left out because a tool or plane had its `max_contacts`.
     pub dropped_contacts: u64,
-    /// Least confidence over the tools that touch; `None` while no examples are active.
+    /// Least confidence over the tools in contact; `None` while no examples are active.
     pub confidence: Option<f32>,
     /// All tools, `[n_tools]`.
     pub tools: Vec<ToolReading>,

@@ -15,7 +15,7 @@ pub struct AtomicHistogram {
     max_ns: AtomicU64,
 }
 
-/// What a histogram says. Times in nanoseconds; zero without samples.
+/// Summary of a histogram. Times in nanoseconds; zero without samples.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Summary {
     /// Number of samples.
@@ -48,7 +48,7 @@ impl AtomicHistogram {
         self.max_ns.fetch_max(ns, Relaxed);
     }
 
-    /// What has been recorded so far.
+    /// Summary of the samples so far.
     pub fn summary(&self) -> Summary {
         let counts: Vec<u64> = self.buckets.iter().map(|b| b.load(Relaxed)).collect();
         let count: u64 = counts.iter().sum();

@@ -13,7 +13,7 @@ use super::stage_timer::TurnProbe;
 use super::statistics::Statistics;
 use super::waker::Waker;
 
-/// How often the frame of a sleeping object is repeated.
+/// Rate at which the frame of a sleeping object is repeated.
 const SLEEPING_HZ: f64 = 2.0;
 
 /// The simulation thread's ends of everything that leaves it.
@@ -84,7 +84,7 @@ impl Outbox {
         self.hand_out_reading(present, detail, false);
     }
 
-    /// Without a tick: answers questions, keeps the status true.
+    /// Without a tick: answers queries and updates the status.
     pub(super) fn hand_out_still(&mut self, present: Present<'_>, detail: &mut Detail) {
         self.answer(present, detail, false, &mut NoProbe);
         self.hand_out_reading(present, detail, true);
@@ -138,7 +138,7 @@ impl Outbox {
         self.answer(present, detail, due, probe);
     }
 
-    /// Writes a frame if it is due or was asked for.
+    /// Writes a frame if it is due or was requested.
     fn answer(&mut self, present: Present<'_>, detail: &mut Detail, due: bool, probe: &mut impl TurnProbe) {
         let Present { model, state, report } = present;
         let questions = self.questions.load(Relaxed);

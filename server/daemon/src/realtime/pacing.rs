@@ -1,6 +1,6 @@
-//! Absolute deadlines with bounded catch-up, as arithmetic on a clock that somebody else reads.
+//! Absolute deadlines with bounded catch-up, as arithmetic on clock readings of the caller.
 
-/// Most ticks that are run back to back to make up for lost time; what is missing beyond that is given up.
+/// Most ticks that run back to back to make up for lost time; more missed ticks are given up.
 pub const MAX_CATCH_UP: u64 = 8;
 
 /// Deadlines `start + k period`. All times in nanoseconds of one monotonic clock.
@@ -12,7 +12,7 @@ pub struct Pacer {
     skipped: u64,
 }
 
-/// What to do now.
+/// Decision of the pacer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Plan {
     /// Nothing is due before this time.
@@ -33,7 +33,7 @@ impl Pacer {
         Self { period_ns, next_ns: now_ns + period_ns, overruns: 0, skipped: 0 }
     }
 
-    /// What to do at `now_ns`. With more than [`MAX_CATCH_UP`] deadlines missed, the oldest ones are given up.
+    /// Decision at `now_ns`. With more than [`MAX_CATCH_UP`] deadlines missed, the oldest ones are given up.
     pub fn plan(&mut self, now_ns: u64) -> Plan {
         if now_ns < self.next_ns {
             return Plan::Wait { until_ns: self.next_ns };

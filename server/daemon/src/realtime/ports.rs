@@ -11,27 +11,27 @@ use super::frame::{Frame, Reading, ToolFrame};
 use super::statistics::Statistics;
 use super::waker::Waker;
 
-/// Everything that others hold of a running [`Loop`](super::Loop).
+/// Far ends of the queues of a running [`Loop`](super::Loop).
 #[derive(Debug)]
 pub struct Ports {
     /// Device poses, one queue per tool.
     pub poses: Vec<rtrb::Producer<PoseSample>>,
-    /// Orders.
+    /// Commands.
     pub commands: CommandPort,
     /// Skin frames.
     pub frames: FramePort,
     /// Wrenches, one queue per tool.
     pub wrenches: Vec<WrenchPort>,
-    /// Where the simulation stands.
+    /// State of the simulation.
     pub readings: Output<Reading>,
     /// Counters and histograms.
     pub statistics: Arc<Statistics>,
 }
 
-/// Orders and their answers.
+/// Commands and their answers.
 #[derive(Debug)]
 pub struct CommandPort {
-    /// Orders.
+    /// Commands.
     pub orders: rtrb::Producer<Command>,
     /// Answers in the same order.
     pub replies: rtrb::Consumer<Reply>,
@@ -46,9 +46,9 @@ pub struct CommandPort {
 pub struct FramePort {
     /// The newest frame.
     pub frames: Output<Frame>,
-    /// Whether anybody listens; without, no frame is made at the publishing rate.
+    /// Whether a client listens; otherwise no frame is made at the publishing rate.
     pub listening: Arc<AtomicBool>,
-    /// Questions asked so far.
+    /// Number of queries so far.
     pub questions: Arc<AtomicU64>,
     /// Woken when a frame is there.
     pub published: Arc<Waker>,
@@ -57,7 +57,7 @@ pub struct FramePort {
 }
 
 impl FramePort {
-    /// Asks for the newest frame, whether it is due or not; a frame whose `answers` has reached the number is it.
+    /// Requests a frame, due or not; the first frame whose `answers` has reached the returned number answers it.
     pub fn ask(&self) -> u64 {
         let number = self.questions.fetch_add(1, Relaxed) + 1;
         self.simulation.wake();
@@ -70,7 +70,7 @@ impl FramePort {
 pub struct WrenchPort {
     /// In order of ticks.
     pub wrenches: rtrb::Consumer<ToolFrame>,
-    /// Whether anybody listens; without, no wrench is made.
+    /// Whether a client listens; otherwise no wrench is made.
     pub listening: Arc<AtomicBool>,
     /// Woken when wrenches are there. One waker serves all tools.
     pub published: Arc<Waker>,

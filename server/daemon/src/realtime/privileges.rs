@@ -1,9 +1,9 @@
-//! What the operating system grants to the simulation thread, and what is done without.
+//! Privileges of the simulation thread: requests to the operating system, and refusals.
 
-/// How the thread is set up.
+/// Requested privileges.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ThreadOptions {
-    /// `SCHED_FIFO` priority to ask for.
+    /// Requested `SCHED_FIFO` priority.
     pub priority: Option<u32>,
     /// Core to pin to.
     pub cpu: Option<usize>,
@@ -11,7 +11,7 @@ pub struct ThreadOptions {
     pub lock_memory: bool,
 }
 
-/// What was granted. Every refusal has a sentence in `warnings` that says what it means and what to do.
+/// Granted privileges. Every refusal has a sentence in `warnings` with its effect and advice.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Grants {
     /// Whether the thread runs under `SCHED_FIFO`.
@@ -20,11 +20,11 @@ pub struct Grants {
     pub memory_locked: bool,
     /// Timer slack \[ns\]; 0 if unknown.
     pub timer_slack_ns: u64,
-    /// What was refused.
+    /// Refusals.
     pub warnings: Vec<String>,
 }
 
-/// Asks for everything on behalf of the calling thread.
+/// Requests all privileges for the calling thread.
 pub(super) fn acquire(options: &ThreadOptions) -> Grants {
     let mut grants = Grants::default();
     if let Some(cpu) = options.cpu {

@@ -25,30 +25,30 @@ const POSES_KEPT_IN_PAUSE: usize = 16;
 pub const MAX_STEP_POSES: usize = 1024;
 /// Wrenches per tool that may wait for their publisher.
 const WRENCH_QUEUE: usize = 256;
-/// Orders that may wait.
+/// Commands that may wait.
 const COMMAND_QUEUE: usize = 4;
 
-/// How a [`Loop`] runs.
+/// Options of a [`Loop`].
 #[derive(Debug, Clone, Copy)]
 pub struct LoopOptions {
     /// Skin frames per second of simulated time.
     pub publish_hz: f64,
     /// Wrenches per second of simulated time and tool.
     pub wrench_hz: f64,
-    /// Ticks only when told to.
+    /// Whether ticks run on command only.
     pub lock_step: bool,
 }
 
-/// What a turn did.
+/// Result of a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Turn {
-    /// Nothing: the simulation stands still.
+    /// No tick: the simulation is paused.
     Still,
     /// A tick.
     Ticked(TickReport),
 }
 
-/// One object and its tools, its queues, and what it takes to turn the one into the other.
+/// Drains the input queues, steps the model, fills the output queues.
 ///
 /// The clock that a tick is told is simulated time, so that a state, its pose histories and the clock always belong
 /// together: after a snapshot is restored, in lock-step, and in a run that was interrupted.
@@ -117,7 +117,7 @@ impl Loop {
         (this, ports)
     }
 
-    /// Obeys orders and, unless the simulation stands still, takes one tick.
+    /// Executes commands and, unless the simulation is paused, runs one tick.
     pub fn turn(&mut self, probe: &mut impl TurnProbe) -> Turn {
         self.obey_orders();
         if self.stands_still() {
@@ -150,17 +150,17 @@ impl Loop {
         &self.statistics
     }
 
-    /// Whether ticks of an order are left.
+    /// Whether ticks of a command are left.
     pub fn is_stepping(&self) -> bool {
         self.steps_left > 0
     }
 
-    /// Whether it ticks only when told to.
+    /// Whether ticks run on command only.
     pub fn is_lock_step(&self) -> bool {
         self.lock_step
     }
 
-    /// Woken when an order or a question has come.
+    /// Woken by commands and queries.
     pub fn waker(&self) -> &Arc<Waker> {
         &self.simulation
     }
@@ -284,7 +284,7 @@ impl Loop {
         }
     }
 
-    /// The status is true before the answer is heard.
+    /// Updates the status before it sends the answer.
     fn reply(&mut self, result: Result<Option<u64>, Refusal>, returned: Returned) {
         let present = Present { model: &self.model, state: &self.state, report: &self.report };
         self.outbox.hand_out_reading(present, &self.detail, self.paused);
@@ -295,7 +295,7 @@ impl Loop {
             snapshot,
             database_generation: self.detail.generation(),
         });
-        // The asker keeps as many orders under way as there is room for answers.
+        // The sender never has more commands under way than there is room for answers.
         let _ = self.replies.push(Reply { outcome, returned });
         self.answered.wake();
     }

@@ -1,8 +1,8 @@
-//! Kept states, in places that were allocated before the simulation started.
+//! Stored states, in memory that was allocated before the simulation started.
 
 use plica_sim::State;
 
-/// How many states are kept; the oldest is overwritten.
+/// Number of stored states; the oldest is overwritten.
 const N_KEPT: u64 = 8;
 
 pub(super) struct Snapshots {
@@ -15,7 +15,7 @@ impl Snapshots {
         Self { states: (0..N_KEPT).map(|_| rest.clone()).collect(), taken: 0 }
     }
 
-    /// Keeps a state; its number, from 1 on.
+    /// Stores a state and returns its number, from 1 on.
     pub(super) fn keep(&mut self, state: &State) -> u64 {
         self.taken += 1;
         self.states[(self.taken % N_KEPT) as usize].copy_from(state);

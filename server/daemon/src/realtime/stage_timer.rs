@@ -6,7 +6,7 @@ use plica_sim::{Probe, Stage};
 
 use super::statistics::Statistics;
 
-/// A probe that is also told when the simulation's last stage is over.
+/// A probe that is also called at the end of the last stage.
 pub trait TurnProbe: Probe {
     /// The tick is over; what follows is handing it out.
     fn leave(&mut self) {}

@@ -1,4 +1,4 @@
-//! What the simulation thread counts and any thread may read.
+//! Counters that the simulation thread writes and any thread may read.
 
 use std::sync::atomic::AtomicU64;
 

@@ -13,22 +13,22 @@ use super::stage_timer::StageTimer;
 use super::statistics::Statistics;
 use super::waker::Waker;
 
-/// How long before a deadline a real-time thread stops sleeping and spins. Without `SCHED_FIFO` it never spins: the
-/// scheduler punishes it.
+/// Time before a deadline in which a real-time thread spins instead of sleeping. Without `SCHED_FIFO` it never spins, since the
+/// scheduler would penalise it.
 const SPIN: Duration = Duration::from_micros(100);
-/// How long a thread in lock-step sleeps when nobody wakes it.
+/// Longest sleep of a thread in lock-step.
 const LOCK_STEP_NAP: Duration = Duration::from_millis(100);
 
-/// When ticks happen.
+/// Pacing of ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pace {
     /// One per time step.
     RealTime,
-    /// When told to.
+    /// On command.
     LockStep,
 }
 
-/// A running simulation thread. Stops when told to, or when dropped.
+/// A running simulation thread. Stops on request, or on drop.
 #[derive(Debug)]
 pub struct Running {
     stop: Arc<AtomicBool>,
@@ -64,7 +64,7 @@ pub fn spawn(core: Loop, options: ThreadOptions) -> std::io::Result<Running> {
 }
 
 impl Running {
-    /// What the operating system granted.
+    /// Privileges that the operating system granted.
     pub fn grants(&self) -> &Grants {
         &self.grants
     }

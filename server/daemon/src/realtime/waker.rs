@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 use std::thread::Thread;
 
-/// A thread to wake. Waking nobody is fine.
+/// A thread to wake; without one, waking has no effect.
 #[derive(Debug, Default)]
 pub struct Waker(OnceLock<Thread>);
 

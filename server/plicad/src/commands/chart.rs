@@ -1,7 +1,7 @@
 //! `plicad chart`: speed against accuracy, one point per configuration.
 //!
-//! Up stands the median error in millimetres against the accurate model's own contact on one fixed held-out set, to the right
-//! the time of a tick: the median of the simulation's ticks in the scene's bench motion, and that of an evaluation.
+//! Vertical axis: median error in millimetres against the accurate model's own contact, on one fixed held-out set. Horizontal
+//! axis: time of a tick, the median of the simulation in the scene's bench motion plus the median of one evaluation.
 
 mod configuration;
 mod measure;
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use plica_scene::Config;
 use plica_scene::setup::setup;
-use plica_training::evaluation::{DEFAULT_METHOD, Judge};
+use plica_training::evaluation::{DEFAULT_METHOD, EvaluationProgress, Evaluator};
 use plica_training::{Database, Setup, fingerprint};
 use serde_json::json;
 
@@ -24,22 +24,22 @@ use configuration::{Configuration, configurations};
 use measure::Bench;
 use points::{Chart, Point};
 
-/// Measures what is missing, draws the chart and lists its front.
+/// Measures missing points, draws the chart and lists its front.
 pub fn run(args: &ChartArgs, json: bool) -> anyhow::Result<()> {
     let config = super::scene(&args.scene)?;
     let setup = setup(&config)?;
-    let (training, held_out) = evaluate::read(&config, &setup, &args.databases)?;
-    let judge = Judge::new(&setup, &training, &held_out)?;
+    let evaluate::Databases { training, held_out } = evaluate::read(&config, &setup, &args.databases)?;
+    let evaluator = Evaluator::new(&setup, &training, &held_out)?;
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out/chart").join(config.name()));
     std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     let file = folder.join("chart.json");
     let identity = identity(&config, &setup, [&training, &held_out], args.ticks);
     let mut chart = Chart::open(&file, config.name(), &identity, args.fresh)?;
-    chart.held_out_states = judge.n_states()[0];
+    chart.held_out_states = evaluator.n_states()[0];
     chart.timestep_us = 1e6 * config.runtime().timestep_s();
-    let all = configurations(&config, &setup, judge.n_examples(), args.quick);
+    let all = configurations(&config, &setup, evaluator.n_examples(), args.quick);
     chart.keep_only(&all);
-    let bench = Bench { config: &config, setup: &setup, held_out: &held_out, judge: &judge, ticks: args.ticks };
+    let bench = Bench { config: &config, setup: &setup, held_out: &held_out, evaluator: &evaluator, ticks: args.ticks };
     measure_missing(&mut chart, &all, &bench, &file)?;
     chart.order_as(&all);
     chart.find_front();
@@ -55,17 +55,17 @@ pub fn run(args: &ChartArgs, json: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Every point is written as soon as it is measured.
+/// Measures missing points and saves the chart after each.
 fn measure_missing(chart: &mut Chart, all: &[Configuration], bench: &Bench<'_>, file: &Path) -> anyhow::Result<()> {
     let bar = evaluate::bar();
     for (done, configuration) in all.iter().enumerate() {
-        evaluate::tell(&bar, done, all.len(), &configuration.name);
+        evaluate::show(&bar, EvaluationProgress { done, all: all.len(), part: &configuration.name });
         if chart.holds(&configuration.name) {
             continue;
         }
-        let said = |part: &str| bar.set_message(format!("{}: {part}", configuration.name));
-        // A model that cannot be compared is no reason to lose the others.
-        match bench.measure(configuration, chart.simulation_us(), &said) {
+        let mut observer = |part: &str| bar.set_message(format!("{}: {part}", configuration.name));
+        // A coarse model that cannot be compared does not stop the others.
+        match bench.measure(configuration, chart.simulation_us(), &mut observer) {
             Ok(point) => chart.points.push(point),
             Err(error) if configuration.is_other_coarse() => {
                 bar.suspend(|| tracing::warn!("{}: {error:#}", configuration.name));
@@ -78,7 +78,7 @@ fn measure_missing(chart: &mut Chart, all: &[Configuration], bench: &Bench<'_>, 
     Ok(())
 }
 
-/// What all points depend on: those of another one are measured again.
+/// Digest of everything that all points depend on; points with another digest are measured again.
 fn identity(config: &Config, setup: &Setup, databases: [&Database; 2], ticks: u64) -> String {
     let databases = databases.map(|d| json!([d.about.seed, d.examples.len(), d.about.versions]));
     fingerprint(&json!({

@@ -8,28 +8,28 @@ use std::path::Path;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use plica_training::evaluation::{Evaluation, Judge, Method, Progress, evaluate, methods, slide};
+use plica_training::evaluation::{Evaluation, EvaluationProgress, Evaluator, Method, evaluate, methods, slide};
 
 use crate::cli::EvaluateArgs;
-pub(super) use databases::read;
+pub(super) use databases::{Databases, read};
 use plica_scene::setup::setup;
 
-/// Judges methods and prints the result.
+/// Evaluates methods and prints their errors.
 pub fn run(args: &EvaluateArgs, json: bool) -> anyhow::Result<()> {
     let config = super::scene(args.scene.as_deref().unwrap_or(Path::new("wedge")))?;
     let setup = setup(&config)?;
     let methods = chosen(methods(setup.stamp_axes), &args.methods)?;
-    let (training, held_out) = read(&config, &setup, &args.databases)?;
-    let judge = Judge::new(&setup, &training, &held_out)?;
+    let Databases { training, held_out } = read(&config, &setup, &args.databases)?;
+    let evaluator = Evaluator::new(&setup, &training, &held_out)?;
     let n_examples = args.examples.map_or(usize::MAX, |n| n as usize);
     let bar = bar();
-    let mut observer = |p: Progress<'_>| {
-        tell(&bar, p.done, p.all, p.part);
+    let mut observer = |p: EvaluationProgress<'_>| {
+        show(&bar, p);
         ControlFlow::Continue(())
     };
-    let mut found = evaluate(&judge, &methods, n_examples, &mut observer)?;
+    let mut found = evaluate(&evaluator, &methods, n_examples, &mut observer)?;
     if args.slide {
-        found.slide = Some(slide(&setup, &judge, &methods, n_examples, &mut observer)?);
+        found.slide = Some(slide(&setup, &evaluator, &methods, n_examples, &mut observer)?);
     }
     bar.finish_and_clear();
     table::print(config.name(), &found);
@@ -39,7 +39,7 @@ pub fn run(args: &EvaluateArgs, json: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Those that are named, in the order of the list.
+/// The methods that `names` lists, in the order of `all`; without names, all of them.
 fn chosen(all: Vec<Method>, names: &[String]) -> anyhow::Result<Vec<Method>> {
     if let Some(unknown) = names.iter().find(|name| all.iter().all(|m| m.name != **name)) {
         let known: Vec<&str> = all.iter().map(|m| m.name.as_str()).collect();
@@ -48,7 +48,7 @@ fn chosen(all: Vec<Method>, names: &[String]) -> anyhow::Result<Vec<Method>> {
     Ok(all.into_iter().filter(|m| names.is_empty() || names.contains(&m.name)).collect())
 }
 
-/// A bar on the terminal.
+/// Progress bar on the terminal.
 pub(super) fn bar() -> ProgressBar {
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {msg}").expect("the template is fixed");
     let bar = ProgressBar::new(1).with_style(style).with_message("builds the model");
@@ -56,11 +56,11 @@ pub(super) fn bar() -> ProgressBar {
     bar
 }
 
-/// Shows what comes next.
-pub(super) fn tell(bar: &ProgressBar, done: usize, all: usize, what: &str) {
-    bar.set_length(all as u64);
-    bar.set_position(done as u64);
-    bar.set_message(what.to_owned());
+/// Shows the progress of an evaluation.
+pub(super) fn show(bar: &ProgressBar, progress: EvaluationProgress<'_>) {
+    bar.set_length(progress.all as u64);
+    bar.set_position(progress.done as u64);
+    bar.set_message(progress.part.to_owned());
 }
 
 fn summary(scene: &str, found: &Evaluation) -> Result<String, serde_json::Error> {

@@ -7,7 +7,7 @@ mod watch;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use plica_jobs::by_hand::{self, JobRequest};
+use plica_jobs::by_hand::{self, JobOptions};
 use plica_scene::Config;
 use plica_scene::setup::setup;
 use plica_training::{DatabaseKind, TrainingFolder, TrainingJob, TrainingReport, default_threads, write_atomically};
@@ -18,7 +18,7 @@ use watch::{Ending, ToLog};
 
 pub(super) use watch::OnTerminal;
 
-/// Trains, or says how firm the accurate skin is.
+/// Trains, or reports the sensitivity of the accurate skin.
 pub fn run(args: &TrainArgs, json: bool) -> anyhow::Result<()> {
     let n_threads = args.threads.unwrap_or_else(default_threads);
     match (&args.job, &args.scene) {
@@ -34,7 +34,7 @@ pub fn run(args: &TrainArgs, json: bool) -> anyhow::Result<()> {
     }
 }
 
-/// A job by hand: makes its folder, shows a bar, prints a table.
+/// Runs a job from the command line: makes its folder, shows a progress bar, prints a table.
 fn run_scene(config: &Config, args: &TrainArgs, n_threads: u32, json: bool) -> anyhow::Result<()> {
     let ending = Ending::listen()?;
     let kind = match args.kind {
@@ -42,14 +42,14 @@ fn run_scene(config: &Config, args: &TrainArgs, n_threads: u32, json: bool) -> a
         TrainKind::Evaluation => DatabaseKind::Evaluation,
     };
     let root = args.folder.clone().unwrap_or_else(|| default_folder(config, kind));
-    let request = JobRequest { kind, examples: args.examples, seed: args.seed, threads: n_threads };
-    let (folder, job) = by_hand::make(&root, config, &request)?;
-    let begun = by_hand::begin(&root).with_context(|| root.display().to_string())?;
+    let options = JobOptions { kind, examples: args.examples, seed: args.seed, threads: n_threads };
+    let (folder, job) = by_hand::make(&root, config, &options)?;
+    let started = by_hand::begin(&root).with_context(|| root.display().to_string())?;
     let watch = OnTerminal::new(Some(ending));
     let result = work(config, &job, &folder, n_threads as usize, &mut |p| watch.observe(&p));
     watch.finish();
-    // The result counts, even if the note about it cannot be written.
-    if let Err(error) = by_hand::end(&root, begun, &result) {
+    // The result is valid even if its state cannot be written.
+    if let Err(error) = by_hand::end(&root, started, &result) {
         tracing::warn!("{}: {error}", root.display());
     }
     let report = result?;
@@ -64,10 +64,10 @@ fn run_scene(config: &Config, args: &TrainArgs, n_threads: u32, json: bool) -> a
     Ok(())
 }
 
-/// A job in its folder, as the daemon starts it: says what happens in lines of a log.
+/// Runs a job in its folder, as the daemon starts it; progress goes to the log.
 fn run_job(root: &Path, threads: Option<u32>, json: bool) -> anyhow::Result<()> {
     let ending = Ending::listen()?;
-    anyhow::ensure!(root.is_dir(), "{}: is no job folder: there is no such folder", root.display());
+    anyhow::ensure!(root.is_dir(), "{}: not a job folder, since there is no such folder", root.display());
     let folder = TrainingFolder::open(root)?;
     let job = folder.job()?;
     let config = Config::from_file(&folder.paths().scene())?;
@@ -81,7 +81,7 @@ fn run_job(root: &Path, threads: Option<u32>, json: bool) -> anyhow::Result<()> 
     Ok(())
 }
 
-/// The one code path of all.
+/// Runs a job; all commands that train call this.
 pub(super) fn work(
     config: &Config,
     job: &TrainingJob,
@@ -93,7 +93,7 @@ pub(super) fn work(
     Ok(plica_training::run(&setup, job, n_threads, folder, observer)?)
 }
 
-/// TrainingFolder of a job by hand, unless another one is named.
+/// Default folder of a job from the command line.
 pub(super) fn default_folder(config: &Config, kind: DatabaseKind) -> PathBuf {
     Path::new("out/train").join(format!("{}-{}", config.name(), kind.name()))
 }

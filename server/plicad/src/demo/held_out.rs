@@ -1,5 +1,7 @@
 //! A press that was never trained on, solved by the accurate model, for comparison.
 
+use std::ops::ControlFlow;
+
 use std::path::Path;
 use std::sync::Arc;
 
@@ -107,7 +109,7 @@ fn most_central(setup: &Setup) -> anyhow::Result<Interaction> {
 }
 
 fn solve(setup: &Setup, interaction: &Interaction) -> anyhow::Result<Example> {
-    match Tandem::new(setup)?.solve(0, interaction, false, &|| false) {
+    match Tandem::new(setup)?.solve(0, interaction, false, &mut || ControlFlow::Continue(())) {
         Ok(Outcome::Accepted(example)) => Ok(*example),
         Ok(Outcome::Rejected(rejection)) => anyhow::bail!("the held-out press is rejected: {}", rejection.message),
         Err(_) => anyhow::bail!("the held-out press was interrupted"),

@@ -70,7 +70,7 @@ fn a_job_runs_and_its_result_is_fetched() {
 #[test]
 fn every_bad_end_has_a_reason() {
     assert_eq!(failed("echo scene.toml: no such key >&2; exit 1"), "exit code 1: scene.toml: no such key");
-    assert_eq!(failed("exit 7"), "exit code 7; it left no word in its log");
+    assert_eq!(failed("exit 7"), "exit code 7; its log is empty");
     assert!(failed("exit 75").starts_with("interrupted from outside"));
     assert_eq!(failed("kill -9 $$"), "killed by signal 9 (SIGKILL): out of memory, or by hand");
     assert!(failed("echo example 3; kill -SEGV $$").contains("signal 11 (SIGSEGV, a crash): example 3"));

@@ -1,4 +1,4 @@
-//! A case, checked.
+//! Checked cases.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ use crate::document::Document;
 use crate::error::ConfigError;
 use crate::ranges;
 
-/// Where every key of a case is explained.
+/// Advice that names the documentation of all keys.
 const EXAMPLE: &str = "configs/cases/cantilever.toml explains every key";
 
 /// A checked case: every number is within its range. Its selections are resolved by [`Problem`](super::Problem).
@@ -32,7 +32,7 @@ pub struct Case {
     solve: SolveOptions,
 }
 
-/// Nodes whose displacement is given in some directions.
+/// Support: nodes with given displacements along some axes.
 #[derive(Debug, Clone)]
 pub(super) struct SupportSpec {
     pub(super) name: String,
@@ -41,14 +41,14 @@ pub(super) struct SupportSpec {
     pub(super) displacement_m: [f64; 3],
 }
 
-/// A load and where it acts.
+/// A load and its selector.
 #[derive(Debug, Clone)]
 pub(super) struct LoadSpec {
     pub(super) selector: Selector,
     pub(super) kind: LoadKind,
 }
 
-/// Loads.
+/// Kinds of loads.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum LoadKind {
     /// Force per rest area \[Pa\].
@@ -59,16 +59,16 @@ pub(super) enum LoadKind {
     Force([f64; 3]),
 }
 
-/// How loads are applied and when a step is good enough.
+/// Load stepping and tolerance of the solver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolveOptions {
-    /// Equal parts in which loads and displacements are applied.
+    /// Number of equal parts of loads and displacements.
     pub steps: u32,
     /// Largest force left, as a share of the largest nodal force.
     pub tolerance: f64,
-    /// Newton steps per part.
+    /// Most Newton steps per part.
     pub max_iterations: u32,
-    /// How often in a row a part that fails is halved.
+    /// Most successive halvings of a part that fails.
     pub max_halvings: u32,
 }
 
@@ -123,13 +123,13 @@ impl Case {
         std::iter::once(&self.material).chain(self.regions.iter().map(|region| &region.material))
     }
 
-    /// How loads are applied and when a step is good enough.
+    /// Load stepping and tolerance of the solver.
     pub fn solve(&self) -> SolveOptions {
         self.solve
     }
 }
 
-/// Names are not empty, and each is used once in its list.
+/// Refuses empty names, and names used twice in a list.
 fn check_names(c: &Check<'_>, raw: &RawCase) -> Result<(), ConfigError> {
     let lists: [(&str, Vec<&str>); 4] = [
         ("regions", raw.regions.iter().map(|r| r.name.as_str()).collect()),

@@ -9,33 +9,33 @@ use super::checked::SolveOptions;
 use super::problem::{Problem, energies};
 use super::solution::{LoadStep, Solution};
 
-/// What is told before every Newton step.
+/// Progress of a solve, reported before every Newton step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct News {
     /// Share of the loads already carried.
     pub reached: f64,
-    /// Share that this step is to carry.
+    /// Share of the loads at the end of this load step.
     pub target: f64,
-    /// Newton steps of this load step.
+    /// Newton steps done in this load step.
     pub iteration: u32,
     /// Largest force left, as a share of the largest nodal force.
     pub residual: f64,
 }
 
-/// Why there is no equilibrium under all loads.
+/// Why the loads cannot be applied completely.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Failure {
-    /// The least step failed.
+    /// The smallest load step failed.
     #[error("no equilibrium beyond {reached:.4} of the loads: {error}, on the way to {target:.4}")]
     Stuck {
-        /// Share of the loads that was carried.
+        /// Share of the loads with an equilibrium.
         reached: f64,
-        /// Share that was not.
+        /// Share of the failed step.
         target: f64,
-        /// How the last attempt failed.
+        /// Error of the last attempt.
         error: SolveError,
     },
-    /// The callback asked to stop, or there is no memory.
+    /// Ended by the observer, or out of memory.
     #[error(transparent)]
     Solve(#[from] SolveError),
 }
@@ -56,7 +56,7 @@ pub fn follow(
     let least_step = largest_step * 0.5_f64.powi(options.max_halvings as i32);
     let (mut reached, mut step, mut n_failed, mut steps) = (0.0, largest_step, 0, Vec::new());
     while reached < 1.0 {
-        // What rounding would leave for one more step is taken along.
+        // A remainder of rounding does not get a step of its own.
         let target = if reached + 1.01 * step >= 1.0 { 1.0 } else { reached + step };
         let mut trial = x.clone();
         match path.attempt([reached, target], &mut trial, observer) {
@@ -76,7 +76,7 @@ pub fn follow(
     Ok(Solution { x, steps, n_failed, n_unknowns, n_factor_values })
 }
 
-/// What all load steps share.
+/// Inputs of all load steps.
 struct Path<'a> {
     problem: &'a Problem,
     params: Params,
@@ -100,9 +100,9 @@ impl<'a> Path<'a> {
     ) -> Result<Info, SolveError> {
         let loads = self.problem.loads_at(target);
         let energies = energies(self.problem.solid(), &loads);
-        let mut tell = |progress: plica_accurate::Progress| {
+        let mut observe = |progress: plica_accurate::Progress| {
             observer(News { reached, target, iteration: progress.iteration, residual: progress.residual })
         };
-        self.solver.minimise(&energies, &self.problem.constraints_at(target), &self.params, x, &mut tell)
+        self.solver.minimise(&energies, &self.problem.constraints_at(target), &self.params, x, &mut observe)
     }
 }

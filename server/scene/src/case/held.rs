@@ -1,4 +1,4 @@
-//! Whether supports leave a body any rigid motion.
+//! Check that supports leave no rigid motion.
 
 use nalgebra::{Matrix6, Point3, SymmetricEigen, Vector3, Vector6};
 use plica_geometry::HexMesh;
@@ -7,10 +7,10 @@ use super::support::Support;
 use crate::document::Document;
 use crate::error::ConfigError;
 
-/// A motion that moves the held coordinates by less than this share of what it moves the body is not held.
+/// Least motion of the held coordinates, as a share of the body's motion.
 const LEAST_HOLD: f64 = 1e-6;
 
-/// Refuses a case in which a body can move without deforming.
+/// Refuses a case in which a body can move without deformation.
 ///
 /// A small rigid motion `u(x) = t + w x (x - c)` moves the held coordinate `k` of a node by `u_k`. The sum of these squares over
 /// held coordinates is a quadratic form in `(t, size w)`: where its least eigenvalue is 0, that motion is free.
@@ -39,7 +39,7 @@ fn extent(nodes: &[Point3<f64>]) -> (Point3<f64>, f64) {
     (centre, nodes.iter().map(|x| (x - centre).norm()).fold(0.0, f64::max))
 }
 
-/// How far coordinate `k` of a node moves, as a row over `(t, size w)`: `e_k . (t + w x arm)`.
+/// Displacement of coordinate `k` of a node, as a row over `(t, size w)`: `e_k . (t + w x arm)`.
 fn moved(k: usize, arm: &Vector3<f64>) -> Vector6<f64> {
     let mut axis = Vector3::zeros();
     axis[k] = 1.0;

@@ -11,7 +11,7 @@ use crate::error::ConfigError;
 /// Range of `lambda_pa` over `mu_pa`: Poisson's ratios from -0.5 to 0.499999.
 const LAMBDA_OVER_MU: [f64; 2] = [-0.5, 5e5];
 
-/// Hexahedra of another material.
+/// Region of another material.
 #[derive(Debug, Clone)]
 pub(super) struct Region {
     pub(super) selector: Selector,
@@ -22,7 +22,7 @@ pub(super) fn check(c: &Check<'_>, raw: &RawMaterial) -> Result<Material, Config
     constants(c, "material", raw)
 }
 
-/// Regions; what they leave out is the base material's.
+/// Regions; constants that they leave out are those of the base material.
 pub(super) fn check_regions(
     c: &Check<'_>,
     raw: &[RawRegion],

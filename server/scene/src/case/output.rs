@@ -13,7 +13,7 @@ use super::solution::Solution;
 /// hexahedron, and regions.
 ///
 /// # Errors
-/// [`ExportError`]: a file that cannot be written.
+/// [`ExportError`]: the file cannot be written.
 pub fn write_result(path: &Path, problem: &Problem, solution: &Solution) -> Result<(), ExportError> {
     let (mesh, solid, x) = (problem.mesh(), problem.solid(), solution.positions());
     let displacement: Vec<Vector3<f64>> = mesh.nodes().iter().zip(x).map(|(rest, x)| x - rest.coords).collect();

@@ -1,4 +1,4 @@
-//! Probes: what a case tells of its result.
+//! Probes: quantities of the result that a case reports.
 
 use nalgebra::Point3;
 use plica_geometry::import::NamedMesh;
@@ -12,10 +12,10 @@ use crate::checks::Check;
 use crate::document::Document;
 use crate::error::ConfigError;
 
-/// A point may lie outside the mesh by this share of its diagonal: rounding of coordinates.
+/// Distance of a point outside of the mesh that counts as rounding, as a share of the mesh's diagonal.
 const OUTSIDE_TOLERANCE: f64 = 1e-6;
 
-/// A probe as checked, before the mesh is known.
+/// A checked probe, not yet resolved on the mesh.
 #[derive(Debug, Clone)]
 pub(super) struct ProbeSpec {
     name: String,
@@ -32,7 +32,7 @@ enum Target {
     StressAt(Point3<f64>),
 }
 
-/// A probe that knows its nodes or its hexahedron.
+/// A probe resolved to nodes or a hexahedron.
 #[derive(Debug, Clone)]
 pub struct Probe {
     /// Name in the output.
@@ -123,7 +123,7 @@ impl ProbeSpec {
     }
 }
 
-/// The place of a point in the mesh, its reference coordinates within the hexahedron.
+/// Hexahedron of a point, with its reference coordinates there.
 fn find(document: &Document, key: &str, mesh: &NamedMesh, x: &Point3<f64>) -> Result<Location, ConfigError> {
     let [lower, upper] = mesh.mesh.bounds();
     let reach = OUTSIDE_TOLERANCE * (upper - lower).norm();

@@ -1,4 +1,4 @@
-//! A case whose selections are found: what is solved.
+//! A case with its selections resolved.
 
 use nalgebra::Vector3;
 use plica_accurate::{Constraints, Energy, Material, MaterialModel, NodalForces, Pressure, Solid, Traction, reactions};
@@ -18,7 +18,7 @@ pub struct Problem {
     mesh: NamedMesh,
     solid: Solid,
     is_linear: bool,
-    /// Region of each hexahedron: 0 for the base material, else one more than its place in the file.
+    /// Region of each hexahedron: 0 for the base material, else one more than the region's index in the file.
     region_of_hex: Vec<usize>,
     supports: Vec<Support>,
     loads: Vec<Load>,
@@ -37,11 +37,11 @@ pub enum Load {
 }
 
 impl Problem {
-    /// Makes or reads the mesh and finds what the case selects.
+    /// Generates or reads the mesh and resolves all selectors.
     ///
     /// # Errors
-    /// [`ConfigError`]: a mesh that cannot be had, a selection that selects nothing, supports that contradict each other or
-    /// leave a body free to move.
+    /// [`ConfigError`]: a mesh that cannot be made or read, an empty selection, supports that contradict each other or leave a
+    /// body free to move.
     pub fn new(case: &Case) -> Result<Self, ConfigError> {
         let document = &case.document;
         let mesh = case.mesh.load(document)?;
@@ -63,17 +63,17 @@ impl Problem {
         &self.mesh.mesh
     }
 
-    /// Its elasticity.
+    /// Elastic energy of the body.
     pub fn solid(&self) -> &Solid {
         &self.solid
     }
 
-    /// Whether all materials are linear: then `det F` says nothing about the result.
+    /// Whether all materials are linear, so that `det F` is no measure of the result.
     pub fn is_linear(&self) -> bool {
         self.is_linear
     }
 
-    /// Region of each hexahedron: 0 for the base material, else one more than the region's place in the file.
+    /// Region of each hexahedron: 0 for the base material, else one more than the region's index in the file.
     pub fn region_of_hex(&self) -> &[usize] {
         &self.region_of_hex
     }
@@ -93,7 +93,7 @@ impl Problem {
         &self.probes
     }
 
-    /// Given positions when a share of the displacements is applied.
+    /// Constraints under a share of the given displacements.
     pub(super) fn constraints_at(&self, share: f64) -> Constraints {
         let mut constraints = Constraints::none(self.mesh().n_nodes());
         for support in &self.supports {
@@ -107,7 +107,7 @@ impl Problem {
         constraints
     }
 
-    /// Loads when a share of them is applied.
+    /// A share of the loads.
     pub(super) fn loads_at(&self, share: f64) -> Vec<Box<dyn Energy>> {
         self.loads.iter().map(|load| load.at(self.mesh(), share)).collect()
     }
@@ -121,7 +121,7 @@ impl Problem {
     }
 }
 
-/// Elasticity and loads as the solver takes them.
+/// Elasticity and loads as energies of the solver.
 pub(super) fn energies<'a>(solid: &'a Solid, loads: &'a [Box<dyn Energy>]) -> Vec<&'a dyn Energy> {
     std::iter::once(solid as &dyn Energy).chain(loads.iter().map(Box::as_ref)).collect()
 }

@@ -7,10 +7,10 @@ use super::probe::{Probe, Sensor};
 use super::problem::Problem;
 use super::solution::Solution;
 
-/// What a probe told.
+/// Reading of a probe.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reading {
-    /// What it told.
+    /// Quantity.
     pub quantity: &'static str,
     /// Unit of the value.
     pub unit: &'static str,
@@ -29,7 +29,7 @@ pub enum Value {
 }
 
 impl Probe {
-    /// What it tells of a solution.
+    /// Reads the sensor in a solution.
     pub fn read(&self, problem: &Problem, solution: &Solution) -> Reading {
         let x = solution.positions();
         match &self.sensor {
@@ -60,7 +60,7 @@ impl Reading {
 }
 
 impl Value {
-    /// All numbers of it.
+    /// All numbers of the value.
     pub fn components(&self) -> &[f64] {
         match self {
             Self::Scalar(number) => std::slice::from_ref(number),

@@ -1,4 +1,4 @@
-//! Which part of a mesh is meant.
+//! Selectors of parts of a mesh.
 
 use plica_geometry::HexMesh;
 use plica_geometry::predicate::Predicate;
@@ -40,7 +40,7 @@ fn side(face: RawFace) -> Side {
     Side { axis, upper }
 }
 
-/// What a selector that selects nothing means to the person who wrote it.
+/// Error of a selector that selects nothing, with advice.
 pub(super) fn explain(document: &Document, key: &str, mesh: &HexMesh, error: &SelectError) -> ConfigError {
     let advice = match error {
         SelectError::UnknownGroup { .. } => "take one of these, or name the part in the mesh file".to_owned(),

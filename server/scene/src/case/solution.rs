@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use plica_accurate::Info;
 use serde::Serialize;
 
-/// One load step that was carried.
+/// A converged load step.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LoadStep {
     /// Share of the loads at its end.
@@ -25,7 +25,7 @@ pub struct LoadStep {
 #[derive(Debug, Clone)]
 pub struct Solution {
     pub(super) x: Vec<Vector3<f64>>,
-    /// Load steps that were carried.
+    /// Converged load steps.
     pub steps: Vec<LoadStep>,
     /// Load steps that failed and were halved.
     pub n_failed: u32,
@@ -41,12 +41,12 @@ impl Solution {
         &self.x
     }
 
-    /// Newton steps of all load steps that were carried.
+    /// Newton steps of all converged load steps.
     pub fn iterations(&self) -> u32 {
         self.steps.iter().map(|step| step.iterations).sum()
     }
 
-    /// Those of them whose matrix was not positive definite.
+    /// Newton steps of them whose matrix was not positive definite.
     pub fn indefinite_steps(&self) -> u32 {
         self.steps.iter().map(|step| step.indefinite_steps).sum()
     }

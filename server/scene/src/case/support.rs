@@ -9,7 +9,7 @@ use super::select;
 use crate::document::Document;
 use crate::error::ConfigError;
 
-/// Nodes whose displacement is given.
+/// Support: nodes with given displacements.
 #[derive(Debug, Clone)]
 pub struct Support {
     /// Name in the case.
@@ -20,7 +20,7 @@ pub struct Support {
     pub displacement_m: Vector3<f64>,
 }
 
-/// Nodes of each support. A direction of a node that two supports hold belongs to the first; both must agree.
+/// Nodes of each support. If two supports hold an axis of a node it belongs to the first; both must give the same displacement.
 pub(super) fn find(document: &Document, specs: &[SupportSpec], mesh: &NamedMesh) -> Result<Vec<Support>, ConfigError> {
     let mut owner: Vec<[Option<usize>; 3]> = vec![[None; 3]; mesh.mesh.n_nodes()];
     let mut supports = Vec::with_capacity(specs.len());

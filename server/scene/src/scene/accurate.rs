@@ -1,4 +1,4 @@
-//! The accurate model of a scene and its tie, checked.
+//! Accurate model of a scene and its tie, checked.
 
 use plica_accurate::{Material, MaterialModel, TieOptions};
 
@@ -8,15 +8,15 @@ use crate::error::ConfigError;
 
 /// Most hexahedra of the accurate model.
 const MAX_HEXES: u64 = 1_000_000;
-/// Hexahedra of the accurate model along an axis for each coarse one, where nothing is said.
+/// Default number of hexahedra of the accurate model per coarse hexahedron and axis.
 const REFINEMENT: usize = 3;
 
-/// Quasi-static model that examples are made with.
+/// Quasi-static model of the examples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AccurateConfig {
     /// Hexahedra along x, y, z.
     pub divisions: [usize; 3],
-    /// Material of everything that no region claims.
+    /// Material outside of all regions.
     pub material: Material,
 }
 
@@ -35,7 +35,7 @@ pub(super) fn check(
         return Err(c.error(
             &format!("{key}.divisions"),
             problem,
-            "use fewer divisions: a solve takes minutes already",
+            "use fewer divisions; with the most allowed, a solve takes minutes",
         ));
     }
     Ok(AccurateConfig {

@@ -7,14 +7,14 @@ use super::raw::RawBench;
 use crate::checks::Check;
 use crate::error::ConfigError;
 
-/// What `plicad bench` does with the tools.
+/// Scripted tool motion of `plicad bench`.
 #[derive(Debug, Clone)]
 pub struct BenchConfig {
     keyframes: Vec<Keyframe>,
     full_press_s: Option<f64>,
 }
 
-/// Where a tool is at one time.
+/// Pose of a tool at one time.
 #[derive(Debug, Clone, Copy)]
 pub struct Keyframe {
     /// Index of the tool.
@@ -31,7 +31,7 @@ impl BenchConfig {
         &self.keyframes
     }
 
-    /// When the tool's force is reported as the force at full press \[s\].
+    /// Time at which the tool's force is reported as the force at full press \[s\].
     pub fn full_press_s(&self) -> Option<f64> {
         self.full_press_s
     }

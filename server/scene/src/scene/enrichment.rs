@@ -9,16 +9,16 @@ use super::raw::{RawCoordinates, RawEnrichment, RawInterpolation};
 use crate::checks::Check;
 use crate::error::ConfigError;
 
-/// How examples become detail on the skin.
+/// Enrichment method of a scene and its database.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EnrichmentConfig {
-    /// The method.
+    /// Options of the method.
     pub options: EnrichmentOptions,
-    /// Examples to start with.
+    /// Database to start with.
     pub database: Option<PathBuf>,
 }
 
-/// Stamps are laid out along `axes`.
+/// Checks the table; stamps are laid out along `axes`.
 pub(super) fn check(
     c: &Check<'_>,
     key: &str,

@@ -12,21 +12,20 @@ pub struct SceneFile {
     pub key: String,
     /// Path as typed, relative to the scene file.
     pub typed: String,
-    /// Where it is.
+    /// Path, resolved.
     pub path: PathBuf,
-    /// Of a mesh: metres per unit.
+    /// Metres per unit of a mesh file.
     pub metres_per_unit: Option<f64>,
 }
 
-/// Files that the text of a scene names, before anything reads them; none if the text is no scene. `file` resolves
-/// relative paths.
+/// Files that the text of a scene names, none of them read; empty if the text is not a scene. `file` resolves relative paths.
 pub fn named_files(file: &Path, text: &str) -> Vec<SceneFile> {
     let document = Document::parse(file, text);
     let listed = document.and_then(|document| Ok(list(document.file(), &document.read()?)));
     listed.unwrap_or_default()
 }
 
-/// The one answer to which files belong to a scene: each key of type [`RawFile`](super::raw::RawFile).
+/// All files that belong to a scene: each key of type [`RawFile`](super::raw::RawFile).
 pub(super) fn list(scene: &Path, raw: &RawConfig) -> Vec<SceneFile> {
     let folder = scene.parent().map(PathBuf::from).unwrap_or_default();
     let file = |key: String, typed: &str, metres_per_unit: Option<f64>| SceneFile {

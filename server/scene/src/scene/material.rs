@@ -8,7 +8,7 @@ use super::raw::{RawMaterial, RawRegion};
 use crate::checks::Check;
 use crate::error::ConfigError;
 
-/// A box of another material.
+/// Box of another material, for both models.
 #[derive(Debug, Clone)]
 pub struct Region {
     /// Name, for messages.

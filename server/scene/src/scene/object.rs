@@ -51,7 +51,7 @@ pub enum MeshConfig {
     Block([f64; 3]),
 }
 
-/// Which coarse nodes are held.
+/// Selection of held coarse nodes.
 #[derive(Debug, Clone, Default)]
 pub struct FixedConfig {
     /// Faces of the mesh's bounding box.
@@ -60,12 +60,12 @@ pub struct FixedConfig {
     pub boxes: Vec<[Point3<f64>; 2]>,
 }
 
-/// A face of a bounding box: an axis and an end of it.
+/// Face of a bounding box: axis and end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Face {
     /// 0, 1, 2 for x, y, z.
     pub axis: usize,
-    /// Whether it is the end of largest coordinate.
+    /// Whether it is the end with the largest coordinate.
     pub upper: bool,
 }
 
@@ -78,20 +78,20 @@ pub struct SkinConfig {
     pub embedding: EmbeddingKind,
 }
 
-/// What is sent, and how often.
+/// Contents and rates of the published data.
 #[derive(Debug, Clone, Copy)]
 pub struct PublishConfig {
     /// Skin frames per second.
     pub publish_hz: f64,
-    /// Whether normals follow the positions.
+    /// Whether frames hold normals.
     pub normals: bool,
-    /// How positions are written.
+    /// Format of skin positions.
     pub format: PositionFormat,
     /// Wrenches per second and tool.
     pub wrench_hz: f64,
 }
 
-/// How skin positions are written.
+/// Format of skin positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PositionFormat {
     /// 32-bit floats, world positions.
@@ -113,11 +113,11 @@ impl ObjectConfig {
     pub fn divisions(&self) -> [usize; 3] {
         self.divisions
     }
-    /// Material of everything that no region claims.
+    /// Material outside of all regions.
     pub fn material(&self) -> Material {
         self.material
     }
-    /// Damping proportional to mass [1/s].
+    /// Damping proportional to mass \[1/s\].
     pub fn mass_damping_per_s(&self) -> f64 {
         self.mass_damping_per_s
     }
@@ -125,7 +125,7 @@ impl ObjectConfig {
     pub fn regions(&self) -> &[Region] {
         &self.regions
     }
-    /// Which coarse nodes are held.
+    /// Selection of held coarse nodes.
     pub fn fixed(&self) -> &FixedConfig {
         &self.fixed
     }
@@ -133,7 +133,7 @@ impl ObjectConfig {
     pub fn planes(&self) -> &[Plane] {
         &self.planes
     }
-    /// Hexahedron of the stiffness.
+    /// Element whose stiffness is precomputed.
     pub fn element(&self) -> ElementKind {
         self.element
     }
@@ -152,15 +152,15 @@ impl ObjectConfig {
     pub fn skin(&self) -> SkinConfig {
         self.skin
     }
-    /// What is sent, and how often.
+    /// Contents and rates of the published data.
     pub fn publish(&self) -> PublishConfig {
         self.publish
     }
-    /// Quasi-static model that examples are made with.
+    /// Quasi-static model of the examples.
     pub fn accurate(&self) -> &AccurateConfig {
         &self.accurate
     }
-    /// How the accurate skin is tied to the coarse imprint.
+    /// Tie of the accurate skin to the coarse imprint.
     pub fn tie(&self) -> TieOptions {
         self.tie
     }

@@ -16,7 +16,7 @@ pub(crate) use training::*;
 /// Largest coordinate of a point in a scene or case \[m\].
 pub(crate) const LARGEST_M: f64 = 1e3;
 
-/// A scene: one soft object, the tools that touch it, and how it runs.
+/// A scene: one soft object, tools, contact and run time.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Plica scene")]
@@ -42,7 +42,7 @@ pub struct RawConfig {
 pub struct RawObject {
     /// Shape.
     pub mesh: RawMesh,
-    /// Material of everything that no region claims.
+    /// Material outside of all regions.
     pub material: RawMaterial,
     /// Boxes of another material; a later region wins.
     #[serde(default)]
@@ -59,21 +59,21 @@ pub struct RawObject {
     /// Contents and rates of the published data.
     #[serde(default)]
     pub publish: RawPublish,
-    /// Quasi-static model that examples are made with.
+    /// Quasi-static model of the examples.
     #[serde(default)]
     pub accurate: RawAccurate,
-    /// How the accurate skin is tied to the coarse imprint.
+    /// Tie of the accurate skin to the coarse imprint.
     #[serde(default)]
     pub tie: RawTie,
     /// Interactions and sampling of `plicad train`.
     #[serde(default)]
     pub training: RawTraining,
-    /// How examples become detail on the skin.
+    /// Enrichment method and its options.
     #[serde(default)]
     pub enrichment: RawEnrichment,
 }
 
-/// Shape of an object, made by a generator.
+/// Generated shape of an object.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawMesh {
@@ -125,7 +125,7 @@ pub struct RawMaterial {
     pub mass_damping_per_s: f64,
 }
 
-/// A box of another material. A hexahedron belongs to it when its centre does.
+/// A box of another material. A hexahedron belongs to the box that contains its centre.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawRegion {
@@ -162,9 +162,9 @@ pub struct RawSupports {
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawFixed {
-    /// Faces of the mesh's bounding box: nodes that lie on them.
+    /// Faces of the mesh's bounding box; nodes on them are held.
     pub faces: Vec<RawFace>,
-    /// Boxes: nodes inside them.
+    /// Boxes; nodes inside are held.
     pub boxes: Vec<RawBox>,
 }
 
@@ -300,16 +300,16 @@ pub struct RawPublish {
     /// Skin frames per second while somebody listens.
     #[schemars(range(min = 1.0, max = 1e3))]
     pub publish_hz: f64,
-    /// Whether vertex normals follow the positions.
+    /// Whether frames hold vertex normals.
     pub normals: bool,
-    /// How positions are written.
+    /// Format of skin positions.
     pub format: RawFormat,
     /// Wrenches per second and tool.
     #[schemars(range(min = 1.0, max = 1e3))]
     pub wrench_hz: f64,
 }
 
-/// How skin positions are written.
+/// Format of skin positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RawFormat {
@@ -325,7 +325,7 @@ pub enum RawFormat {
 pub struct RawTool {
     /// Shape in the tool's own frame.
     pub shape: RawShape,
-    /// How the simulated proxy follows the device.
+    /// Coupling of the simulated proxy to the device.
     #[serde(default = "defaults::spring")]
     pub coupling: RawCoupling,
     /// Spring of the coupling [N/m].
@@ -346,7 +346,7 @@ pub struct RawTool {
     /// Largest torque the coupling transmits [N m].
     #[schemars(range(min = 1e-4, max = 100.0))]
     pub max_torque_n_m: Option<f64>,
-    /// How device poses become one pose per tick.
+    /// Sampling of device poses, one per tick.
     #[serde(default = "defaults::latest")]
     pub sampling: RawSampling,
     /// Interpolation: delay behind the newest sample [ms].
@@ -418,17 +418,17 @@ pub enum RawShape {
     },
 }
 
-/// How the simulated proxy follows the device.
+/// Coupling of the simulated proxy to the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RawCoupling {
     /// A light rigid body on a saturating 6-DOF spring-damper.
     Spring,
-    /// The proxy is where the device is.
+    /// The proxy follows the device exactly.
     Rigid,
 }
 
-/// How device poses become one pose per tick.
+/// Sampling of device poses, one per tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RawSampling {
@@ -492,13 +492,13 @@ pub struct RawRuntime {
     /// Core that the simulation thread is pinned to.
     #[schemars(range(min = 0, max = 1023))]
     pub cpu: Option<u32>,
-    /// Whether to lock memory, so that no tick waits for a page.
+    /// Whether memory is locked, so that no tick waits for a page.
     pub lock_memory: bool,
-    /// When an object at rest stops being solved.
+    /// Sleep of an object at rest, which is not solved.
     pub sleep: RawSleep,
 }
 
-/// When an object at rest stops being solved.
+/// Sleep of an object at rest, which is not solved.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawSleep {
@@ -540,7 +540,7 @@ pub struct RawKeyframe {
     pub orientation_xyzw: [f64; 4],
 }
 
-/// Values of keys that are left out.
+/// Defaults of keys.
 mod defaults {
     use plica_sim::{ContactOptions, SleepOptions, SolverOptions};
 

@@ -24,7 +24,7 @@ impl RuntimeConfig {
     pub fn gravity_m_per_s2(&self) -> Vector3<f64> {
         self.gravity_m_per_s2
     }
-    /// `SCHED_FIFO` priority to ask for, if any.
+    /// Requested `SCHED_FIFO` priority, if any.
     pub fn realtime_priority(&self) -> Option<u32> {
         self.realtime_priority
     }
@@ -32,11 +32,11 @@ impl RuntimeConfig {
     pub fn cpu(&self) -> Option<usize> {
         self.cpu
     }
-    /// Whether to lock memory.
+    /// Whether memory is locked.
     pub fn lock_memory(&self) -> bool {
         self.lock_memory
     }
-    /// When an object at rest stops being solved.
+    /// Sleep of an object at rest.
     pub fn sleep(&self) -> &SleepOptions {
         &self.sleep
     }

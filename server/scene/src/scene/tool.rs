@@ -1,4 +1,4 @@
-//! The tools of a scene, checked.
+//! Tools of a scene, checked.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
@@ -14,7 +14,7 @@ use crate::error::ConfigError;
 
 /// Most tools of a scene.
 const MAX_TOOLS: usize = 16;
-/// Number of points of a convex hull.
+/// Least and largest number of points of a convex hull.
 const HULL_POINTS: RangeInclusive<usize> = 4..=1000;
 
 /// All tools in alphabetical order.

@@ -10,10 +10,10 @@ use super::raw::{
 use crate::checks::Check;
 use crate::error::ConfigError;
 
-/// A direction shorter than this is none.
+/// Least length of a direction.
 const SHORTEST_DIRECTION: f64 = 1e-6;
 
-/// What `plicad train` does.
+/// Interactions and sampling of `plicad train`.
 #[derive(Debug, Clone)]
 pub struct TrainingConfig {
     /// Tool that interacts, by index; `None` in a scene without tools.
@@ -22,23 +22,23 @@ pub struct TrainingConfig {
     pub examples: u32,
     /// Seed of the interactions.
     pub seed: u64,
-    /// How many are drawn for each one that farthest-point sampling keeps; 1: as they are drawn.
+    /// Candidates drawn for each interaction that farthest-point sampling keeps; 1: all candidates are kept.
     pub candidates_per_example: u32,
-    /// What the features of farthest-point sampling are divided by.
+    /// Scales of the features of farthest-point sampling.
     pub features: FeatureScales,
     /// Ranges of drawn interactions.
     pub ranges: PressRanges,
     /// A recorded motion in place of drawn interactions.
     pub recorded: Option<RecordedConfig>,
-    /// Stamp axis, and the one that stands in.
+    /// Stamp axis, and its replacement.
     pub stamp_axes: [Vector3<f64>; 2],
-    /// How the real-time model is driven to a pose.
+    /// Drive of the real-time model to a pose.
     pub drive: DriveOptions,
     /// Interactions of an evaluation in the trained region.
     pub evaluation_examples: u32,
     /// Seed of an evaluation.
     pub evaluation_seed: u64,
-    /// Sets outside of what is trained.
+    /// Sets outside of the trained ranges.
     pub outside: Vec<OutsideConfig>,
 }
 
@@ -47,11 +47,11 @@ pub struct TrainingConfig {
 pub struct RecordedConfig {
     /// Path as typed, relative to the scene file.
     pub file: String,
-    /// Whether it is mapped into the room above the object.
+    /// Whether it is mapped into the workspace above the object.
     pub fit: bool,
 }
 
-/// A set of interactions outside of what is trained.
+/// A set of interactions outside of the trained ranges.
 #[derive(Debug, Clone)]
 pub struct OutsideConfig {
     /// Kind of its examples.
@@ -60,7 +60,7 @@ pub struct OutsideConfig {
     pub lifts: bool,
     /// Interactions.
     pub examples: u32,
-    /// Their ranges.
+    /// Ranges of the interactions.
     pub ranges: PressRanges,
 }
 
@@ -82,7 +82,11 @@ pub(super) fn check(
     let evaluation = &raw.evaluation;
     if evaluation.seed == raw.seed {
         let problem = format!("{} is the seed of training as well", raw.seed);
-        return Err(c.error(&at("evaluation.seed"), problem, "choose another one: what is trained on proves nothing"));
+        return Err(c.error(
+            &at("evaluation.seed"),
+            problem,
+            "choose another one, since interactions that were trained on show no error of unseen ones",
+        ));
     }
     let outside = evaluation.outside.iter().enumerate();
     let outside = outside.map(|(i, set)| check_outside(c, &at(&format!("evaluation.outside.{i}")), set, &ranges));

@@ -1,14 +1,14 @@
-//! Inputs that no example looks like, but that a simulation may well meet.
+//! Degenerate inputs: far from every example, yet possible in a simulation.
 
 use plica_sim::enrichment::Examples;
 use serde::{Deserialize, Serialize};
 
-use super::judge::{EvaluationError, Judge};
+use super::evaluator::{EvaluationError, Evaluator};
 use super::measure::Group;
 use super::methods::Method;
 use super::statistics::Quantiles;
 
-/// What a method makes of them.
+/// A method on degenerate inputs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Degenerate {
     /// RMS of the detail over that of `d[i]` for `u = 0` at the training contact points; it should be 0.
@@ -19,12 +19,12 @@ pub struct Degenerate {
     pub doubled: Quantiles,
     /// For `u = 4 u[i]`.
     pub quadrupled: Quantiles,
-    /// States in the region, taught by the training set taken twice: it should be as if taken once.
+    /// States in the region, trained on the training set taken twice; it should be the same as with the set taken once.
     pub duplicated: Group,
 }
 
-impl Judge {
-    /// What `method` makes of degenerate inputs, taught by the first `n_examples` examples.
+impl Evaluator {
+    /// Evaluates `method`, trained on the first `n_examples` examples, on degenerate inputs.
     ///
     /// # Errors
     /// [`EvaluationError::Method`].
@@ -48,7 +48,7 @@ impl Judge {
             reversed: over_own(-1.0)?,
             doubled: over_own(2.0)?,
             quadrupled: over_own(4.0)?,
-            duplicated: self.judge_with(method, &twice(&examples))?.in_region,
+            duplicated: self.evaluate_with(method, &twice(&examples))?.in_region,
         })
     }
 }

@@ -1,4 +1,4 @@
-//! How far a field of detail is from the one that should be.
+//! Errors of a field of detail.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +7,7 @@ use super::statistics::Quantiles;
 /// A vector per skin vertex, `[n_skin][3]` \[m\].
 pub(super) type Field = [[f32; 3]];
 
-/// Vertices with their areas that an error is taken over.
+/// Set of vertices with areas, over which errors are taken.
 #[derive(Debug, Clone)]
 pub(super) struct Patch {
     /// Vertex and area \[m2\].
@@ -31,7 +31,7 @@ pub(super) struct Measure {
 /// Errors of many states.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Group {
-    /// How many states.
+    /// Number of states.
     pub states: usize,
     /// Median of `E` over the states.
     pub median: f64,
@@ -52,7 +52,7 @@ pub struct Group {
 }
 
 impl Patch {
-    /// Those of all vertices that `is_in` says.
+    /// Patch of the vertices for which `is_in` holds.
     pub(super) fn new(areas: &[f64], is_in: impl Fn(usize) -> bool) -> Self {
         let vertices: Vec<_> = areas.iter().copied().enumerate().filter(|(v, _)| is_in(*v)).collect();
         Self { area: vertices.iter().map(|(_, area)| area).sum(), vertices }
@@ -69,7 +69,7 @@ impl Patch {
         self.vertices.iter().map(|(v, _)| difference_squared(a, b, *v)).fold(0.0, f64::max).sqrt()
     }
 
-    /// Of `detail` against what the coarse skin misses of both references; `None` where it misses nothing.
+    /// Error of `detail` against the detail of both references; `None` where the tied detail is zero.
     pub(super) fn measure(&self, detail: &Field, tied: &Field, independent: Option<&Field>) -> Option<Measure> {
         let own = self.rms(tied, None);
         let tied_m = self.rms(detail, Some(tied));
@@ -83,7 +83,7 @@ impl Patch {
 }
 
 impl Group {
-    /// `None` of no state.
+    /// `None` without a state.
     pub(super) fn of(measures: &[Measure]) -> Option<Self> {
         let over = |f: &dyn Fn(&Measure) -> f64| Quantiles::of(measures.iter().map(f));
         let ratio = over(&|m| m.ratio)?;

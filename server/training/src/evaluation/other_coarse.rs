@@ -1,4 +1,7 @@
-//! Another coarse model on the same held-out interactions: it is driven to them anew, and nothing enriches it.
+//! Another coarse model, driven to the same held-out interactions, without enrichment.
+
+use std::ops::ControlFlow;
+use std::sync::{Mutex, PoisonError};
 
 use nalgebra::Vector3;
 use plica_geometry::ReferenceSkin;
@@ -6,8 +9,8 @@ use plica_sim::{Model, State};
 use rayon::prelude::*;
 
 use super::measure::Patch;
+use super::progress::{EvaluationObserver, EvaluationProgress};
 use super::statistics::Quantiles;
-use crate::coarse::Cancelled;
 use crate::database::Database;
 use crate::error::TrainingError;
 use crate::example::{Example, to_f32};
@@ -16,18 +19,18 @@ use crate::plan::plan;
 use crate::setup::{IN_REGION, Setup};
 use crate::tandem::{Stop, Tandem};
 
-/// How far another coarse model is from the accurate one.
+/// Error of another coarse model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OtherCoarse {
     /// RMS errors of its skin against `independent`, states drawn as training draws \[mm\].
     pub independent_mm: Quantiles,
-    /// Those states.
+    /// Number of those states.
     pub states: usize,
-    /// States where it did not come to rest, or lost the tool.
+    /// States where it did not settle, or lost the tool.
     pub failed: usize,
 }
 
-/// Why it cannot be compared.
+/// Why another coarse model cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum OtherCoarseError {
     /// Interactions, models or threads.
@@ -41,7 +44,7 @@ pub enum OtherCoarseError {
         /// Its number.
         index: u32,
     },
-    /// Skins can only be compared vertex by vertex.
+    /// The skins have different numbers of vertices.
     #[error("the other model has {found} skin vertices, the scene {expected}")]
     OtherSkin {
         /// Of the other model.
@@ -49,21 +52,38 @@ pub enum OtherCoarseError {
         /// Of the scene.
         expected: usize,
     },
-    /// There is nothing to compare with.
+    /// No held-out example can be used.
     #[error(
         "no held-out example in the trained region holds the accurate model's own contact, or the other model settled at none"
     )]
     Nothing,
 }
 
-/// One held-out interaction with the skin that should come of it.
+/// One held-out interaction with its accurate skin.
 struct Case {
     interaction: Interaction,
     /// Offsets of the accurate skin from rest, `[n_skin]` \[m\].
     accurate: Vec<[f32; 3]>,
 }
 
-/// Drives the coarse model of `other` to the held-out interactions of `setup` in the trained region. `done` is told after each.
+/// Interactions done, and the observer that all threads call in turn.
+struct SharedProgress<'a, 'b> {
+    all: usize,
+    shared: Mutex<(usize, &'a mut EvaluationObserver<'b>)>,
+}
+
+impl SharedProgress<'_, '_> {
+    /// Calls the observer after `n_more` more interactions.
+    fn observe(&self, n_more: usize) -> ControlFlow<()> {
+        let mut shared = self.shared.lock().unwrap_or_else(PoisonError::into_inner);
+        let (done, observer) = &mut *shared;
+        *done += n_more;
+        observer(EvaluationProgress { done: *done, all: self.all, part: "interactions" })
+    }
+}
+
+/// Drives the coarse model of `other` to the held-out interactions of `setup` in the trained region. The observer is called
+/// after each interaction and every few ticks.
 ///
 /// # Errors
 /// See [`OtherCoarseError`].
@@ -72,7 +92,7 @@ pub fn other_coarse(
     held_out: &Database,
     other: &Setup,
     n_threads: usize,
-    (done, cancelled): (&(dyn Fn() + Sync), Cancelled<'_>),
+    observer: &mut EvaluationObserver<'_>,
 ) -> Result<OtherCoarse, OtherCoarseError> {
     let expected = setup.coarse.skin.n_vertices();
     let found = other.coarse.skin.n_vertices();
@@ -82,11 +102,12 @@ pub fn other_coarse(
     let cases = cases(setup, held_out)?;
     let areas = ReferenceSkin::new(&setup.coarse.skin).vertex_areas().to_vec();
     let whole = Patch::new(&areas, |_| true);
+    let progress = SharedProgress { all: cases.len(), shared: Mutex::new((0, observer)) };
     let work = |cases: &[Case]| -> Result<Vec<Option<f64>>, TrainingError> {
         let mut tandem = Tandem::new(other)?;
         let mut errors = Vec::new();
         for case in cases {
-            errors.push(match tandem.solve_coarse(&case.interaction, cancelled) {
+            errors.push(match tandem.solve_coarse(&case.interaction, &mut || progress.observe(0)) {
                 Ok(half) => {
                     let offsets: Vec<_> = half.state.offsets.iter().map(to_f32).collect();
                     Some(1e3 * whole.rms(&offsets, Some(&case.accurate)))
@@ -94,7 +115,9 @@ pub fn other_coarse(
                 Err(Stop::Rejected(..)) => None,
                 Err(Stop::Interrupted) => return Err(TrainingError::Interrupted),
             });
-            done();
+            if progress.observe(1).is_break() {
+                return Err(TrainingError::Interrupted);
+            }
         }
         Ok(errors)
     };
@@ -108,7 +131,7 @@ pub fn other_coarse(
     Ok(OtherCoarse { independent_mm, states, failed: errors.len() - states })
 }
 
-/// The held-out interactions in the trained region. A database does not hold them, but they are drawn again from its seed.
+/// The held-out interactions in the trained region, drawn again from the seed of the database, which does not hold them.
 fn cases(setup: &Setup, held_out: &Database) -> Result<Vec<Case>, OtherCoarseError> {
     let inside: Vec<&Example> = held_out.examples.iter().filter(|e| e.record.kind == IN_REGION).collect();
     let mut set = setup.evaluation.first().ok_or(OtherCoarseError::Nothing)?.clone();

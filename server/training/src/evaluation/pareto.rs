@@ -1,6 +1,6 @@
-//! Which of many compromises are worth having.
+//! Pareto front of points with two costs.
 
-/// Of points `[cost, error]` those that no other one beats: none is at most as large in both and smaller in one. By rising
+/// Indices of the points `[cost, error]` on the front: no other point is at most as large in both and smaller in one. By rising
 /// cost; of equal points the first.
 pub fn pareto_front(points: &[[f64; 2]]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..points.len()).collect();

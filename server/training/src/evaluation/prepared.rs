@@ -1,4 +1,4 @@
-//! One way to enrich, made ready to be run state after state.
+//! An enrichment method with its scratch memory, run state by state.
 
 use std::time::Instant;
 
@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use plica_sim::enrichment::{Contact, Enricher, EnricherScratch, Touch};
 use plica_sim::{Model, State};
 
-/// What a method makes of one state.
+/// Result of a method on one state.
 pub(super) struct Outcome {
     /// `[n_skin]` \[m\]
     pub(super) detail: Vec<[f32; 3]>,
@@ -15,7 +15,7 @@ pub(super) struct Outcome {
     pub(super) time_us: f64,
 }
 
-/// An enricher, and what one thread needs to run it.
+/// An enricher with the memory of one thread.
 pub(super) struct Prepared<'a> {
     model: &'a Model,
     enricher: Enricher,
@@ -53,7 +53,7 @@ impl<'a> Prepared<'a> {
         (&self.plain, confidence)
     }
 
-    /// The same, with the time of the second of two evaluations on one thread.
+    /// [`Self::evaluate`] twice, with the time of the second evaluation.
     pub(super) fn evaluate_timed(&mut self, u: &[[f32; 3]], touch: &Touch) -> Outcome {
         self.evaluate(u, 1.0, touch);
         let begin = Instant::now();

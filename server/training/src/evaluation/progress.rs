@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 /// The part of the work that begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Progress<'a> {
+pub struct EvaluationProgress<'a> {
     /// Parts done.
     pub done: usize,
     /// Parts in all.
@@ -13,5 +13,5 @@ pub struct Progress<'a> {
     pub part: &'a str,
 }
 
-/// Called before each part; a break ends the work.
-pub type Observer<'a> = dyn FnMut(Progress<'_>) -> ControlFlow<()> + 'a;
+/// Observer of an evaluation: called before each part. `Break` ends the evaluation.
+pub type EvaluationObserver<'a> = dyn FnMut(EvaluationProgress<'_>) -> ControlFlow<()> + Send + 'a;

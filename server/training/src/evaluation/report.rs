@@ -6,13 +6,13 @@ use plica_sim::enrichment::DEFAULT_METHOD;
 use serde::{Deserialize, Serialize};
 
 use super::degenerate::Degenerate;
-use super::judge::{EvaluationError, Judge};
+use super::evaluator::{EvaluationError, Evaluator};
+use super::method_evaluation::MethodEvaluation;
 use super::methods::Method;
-use super::progress::{Observer, Progress};
+use super::progress::{EvaluationObserver, EvaluationProgress};
 use super::slide::Slide;
-use super::verdict::Verdict;
 
-/// Methods that are judged with fewer examples as well.
+/// Methods evaluated with fewer examples as well.
 pub const WITH_FEWER: [&str; 3] = [DEFAULT_METHOD, "ssh12-blend", "ridge-vector"];
 /// Numbers of examples.
 pub const EXAMPLE_COUNTS: [usize; 4] = [16, 32, 64, 128];
@@ -20,12 +20,12 @@ pub const EXAMPLE_COUNTS: [usize; 4] = [16, 32, 64, 128];
 /// All methods on the same held-out states.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Evaluation {
-    /// States that methods are judged by.
+    /// Numbers of held-out states.
     pub held_out: Counts,
     /// The coarse skin, then every method with all examples.
-    pub methods: Vec<Judgement>,
+    pub methods: Vec<MethodReport>,
     /// Some methods with fewer examples.
-    pub by_examples: Vec<Verdict>,
+    pub by_examples: Vec<MethodEvaluation>,
     /// Along a slide, if it was asked for.
     pub slide: Option<Slide>,
     /// Name of the default method.
@@ -39,53 +39,53 @@ pub struct Counts {
     pub in_region: usize,
     /// All others.
     pub outside: usize,
-    /// Not judged by, since the coarse skin misses next to nothing there.
+    /// Left out, because their detail is below the threshold.
     pub left_out: usize,
 }
 
 /// A method on held-out states and on degenerate inputs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Judgement {
+pub struct MethodReport {
     /// On held-out states.
     #[serde(flatten)]
-    pub verdict: Verdict,
+    pub evaluation: MethodEvaluation,
     /// On degenerate inputs; the coarse skin has none.
     pub degenerate: Option<Degenerate>,
 }
 
-/// Judges `methods` with the first `n_examples` examples, and some of them with fewer.
+/// Evaluates `methods` with the first `n_examples` examples, and some of them with fewer.
 ///
 /// # Errors
 /// See [`EvaluationError`].
 pub fn evaluate(
-    judge: &Judge,
+    evaluator: &Evaluator,
     methods: &[Method],
     n_examples: usize,
-    observer: &mut Observer<'_>,
+    observer: &mut EvaluationObserver<'_>,
 ) -> Result<Evaluation, EvaluationError> {
-    let n_examples = n_examples.min(judge.n_examples());
+    let n_examples = n_examples.min(evaluator.n_examples());
     let with_fewer = methods.iter().filter(|m| WITH_FEWER.contains(&m.name.as_str()));
     let counts = EXAMPLE_COUNTS.into_iter().filter(|n| *n <= n_examples);
     let fewer: Vec<(&Method, usize)> = with_fewer.flat_map(|m| counts.clone().map(move |n| (m, n))).collect();
     let n_parts = methods.len() + fewer.len();
-    let mut begin = |done, part: &str| match observer(Progress { done, all: n_parts, part }) {
+    let mut begin = |done, part: &str| match observer(EvaluationProgress { done, all: n_parts, part }) {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(EvaluationError::Interrupted),
     };
-    let mut all = vec![Judgement { verdict: judge.coarse()?, degenerate: None }];
+    let mut all = vec![MethodReport { evaluation: evaluator.coarse()?, degenerate: None }];
     for (done, method) in methods.iter().enumerate() {
         begin(done, &method.name)?;
-        let verdict = judge.judge(method, n_examples)?;
-        all.push(Judgement { verdict, degenerate: Some(judge.degenerate(method, n_examples)?) });
+        let evaluation = evaluator.evaluate(method, n_examples)?;
+        all.push(MethodReport { evaluation, degenerate: Some(evaluator.degenerate(method, n_examples)?) });
     }
     let mut by_examples = Vec::new();
     for (done, (method, n)) in fewer.into_iter().enumerate() {
         begin(methods.len() + done, &format!("{} with {n} examples", method.name))?;
-        by_examples.push(judge.judge(method, n)?);
+        by_examples.push(evaluator.evaluate(method, n)?);
     }
-    let [in_region, outside] = judge.n_states();
+    let [in_region, outside] = evaluator.n_states();
     Ok(Evaluation {
-        held_out: Counts { in_region, outside, left_out: judge.n_left_out() },
+        held_out: Counts { in_region, outside, left_out: evaluator.n_left_out() },
         methods: all,
         by_examples,
         slide: None,

@@ -3,13 +3,15 @@
 //! The second difference `d[k-1] - 2 d[k] + d[k+1]` between states a small step apart is what an eye sees as jitter. The accurate
 //! solution has one of its own, since vertices enter and leave the contact.
 
+use std::ops::ControlFlow;
+
 use nalgebra::{Isometry3, Point3};
 use plica_sim::enrichment::Touch;
 use serde::{Deserialize, Serialize};
 
-use super::judge::{EvaluationError, Judge};
+use super::evaluator::{EvaluationError, Evaluator};
 use super::methods::Method;
-use super::progress::{Observer, Progress};
+use super::progress::{EvaluationObserver, EvaluationProgress};
 use super::statistics::Quantiles;
 use crate::coarse::Interrupted;
 use crate::error::TrainingError;
@@ -21,9 +23,9 @@ use crate::tandem::Tandem;
 use crate::tool_path::ToolPath;
 use plica_geometry::ReferenceSkin;
 
-/// From state to state \[m\].
+/// Distance between states \[m\].
 const STEP_M: f64 = 0.9e-3;
-/// Presses among which the two that lie farthest apart are begin and end.
+/// Number of presses drawn; the two farthest apart are the ends of the slide.
 const CANDIDATES: usize = 64;
 
 /// Detail along a slide.
@@ -33,13 +35,13 @@ pub struct Slide {
     pub states: usize,
     /// States with contact whose accurate solution was rejected.
     pub rejected: usize,
-    /// Why the first of them was.
+    /// Reason of the first rejection.
     pub first_rejection: Option<String>,
-    /// From state to state \[mm\].
+    /// Distance between states \[mm\].
     pub step_mm: f64,
-    /// Of the accurate solution, `tied`.
+    /// Second differences of the accurate solution, `tied`.
     pub accurate: Roughness,
-    /// Of each method.
+    /// Results of each method.
     pub methods: Vec<SlideMethod>,
 }
 
@@ -75,28 +77,28 @@ pub enum SlideError {
     /// Recorded interactions have no region to slide through.
     #[error("a slide is drawn where training draws presses; this scene trains on recorded poses")]
     NotDrawn,
-    /// The tool touches nothing, or no accurate solution is accepted.
+    /// Too few states with contact and an accepted accurate solution.
     #[error("along the slide there are not three neighbouring states with contact and an accurate solution")]
     TooShort,
 }
 
-/// A state on the way.
+/// A state along the slide.
 struct Station {
     displacements: Vec<[f32; 3]>,
     touch: Touch,
     tied: Vec<[f32; 3]>,
 }
 
-/// Slides from one end of the trained region to the other and compares `methods`, taught by the first `n_examples` examples.
+/// Slides from one end of the trained region to the other and compares `methods`, trained on the first `n_examples` examples.
 ///
 /// # Errors
 /// See [`SlideError`].
 pub fn slide(
     setup: &Setup,
-    judge: &Judge,
+    evaluator: &Evaluator,
     methods: &[Method],
     n_examples: usize,
-    observer: &mut Observer<'_>,
+    observer: &mut EvaluationObserver<'_>,
 ) -> Result<Slide, SlideError> {
     let (tool, poses) = poses(setup)?;
     let mut stations: Vec<Option<Station>> = Vec::new();
@@ -107,10 +109,10 @@ pub fn slide(
         tool,
         &poses,
         |tandem, half| {
-            if observer(Progress { done: stations.len(), all: poses.len(), part: "slide" }).is_break() {
+            if observer(EvaluationProgress { done: stations.len(), all: poses.len(), part: "slide" }).is_break() {
                 return Err(Interrupted);
             }
-            let tied = half.as_ref().map(|half| tandem.solve_tied(half, &|| false));
+            let tied = half.as_ref().map(|half| tandem.solve_tied(half, &mut || ControlFlow::Continue(())));
             if let Some(Err(stop)) = &tied {
                 rejected += 1;
                 first_rejection.get_or_insert_with(|| stop.to_string());
@@ -125,7 +127,7 @@ pub fn slide(
             }));
             Ok(())
         },
-        &|| false,
+        &mut || ControlFlow::Continue(()),
     );
     walked.map_err(interrupted)?;
     let accurate: Vec<_> = stations.iter().map(|s| s.as_ref().map(|s| s.tied.clone())).collect();
@@ -134,23 +136,23 @@ pub fn slide(
         rejected,
         first_rejection,
         step_mm: 1e3 * STEP_M,
-        accurate: roughness(judge, &accurate).ok_or(SlideError::TooShort)?,
+        accurate: roughness(evaluator, &accurate).ok_or(SlideError::TooShort)?,
         methods: Vec::new(),
     };
     for (done, method) in methods.iter().enumerate() {
         let part = format!("{} along the slide", method.name);
-        if observer(Progress { done, all: methods.len(), part: &part }).is_break() {
+        if observer(EvaluationProgress { done, all: methods.len(), part: &part }).is_break() {
             return Err(interrupted(Interrupted));
         }
-        let mut prepared = judge.prepare(method, &judge.examples(n_examples))?;
+        let mut prepared = evaluator.prepare(method, &evaluator.examples(n_examples))?;
         let mut detail = |s: &Station| prepared.evaluate(&s.displacements, 1.0, &s.touch).0.to_vec();
         let details: Vec<_> = stations.iter().map(|s| s.as_ref().map(&mut detail)).collect();
         let errors = stations.iter().flatten().zip(details.iter().flatten());
-        let errors = errors.filter_map(|(s, d)| judge.ratio(d, &s.tied));
+        let errors = errors.filter_map(|(s, d)| evaluator.ratio(d, &s.tied));
         found.methods.push(SlideMethod {
             name: method.name.clone(),
             error: Quantiles::of(errors),
-            roughness: roughness(judge, &details).ok_or(SlideError::TooShort)?,
+            roughness: roughness(evaluator, &details).ok_or(SlideError::TooShort)?,
         });
     }
     Ok(found)
@@ -167,9 +169,9 @@ fn poses(setup: &Setup) -> Result<(usize, Vec<Isometry3<f64>>), SlideError> {
     let presses = plan(setup, &[set], setup.evaluation_seed).map_err(TrainingError::from)?;
     let skin = ReferenceSkin::new(&setup.coarse.skin);
     let shape = obstacle(&setup.coarse.tools[tool].shape).map_err(|_| SlideError::TooShort)?;
-    let ways: Vec<ToolPath> = presses.iter().filter_map(|press| ToolPath::of(press, &shape, &skin)).collect();
+    let paths: Vec<ToolPath> = presses.iter().filter_map(|press| ToolPath::of(press, &shape, &skin)).collect();
     let apart = |(a, b): &(&ToolPath, &ToolPath)| (a.end().translation.vector - b.end().translation.vector).norm();
-    let pairs = ways.iter().flat_map(|a| ways.iter().map(move |b| (a, b)));
+    let pairs = paths.iter().flat_map(|a| paths.iter().map(move |b| (a, b)));
     let farthest = pairs.max_by(|a, b| apart(a).total_cmp(&apart(b)));
     let (first, last) = farthest.ok_or(SlideError::TooShort)?;
     let back = last.poses().iter().rev();
@@ -178,14 +180,14 @@ fn poses(setup: &Setup) -> Result<(usize, Vec<Isometry3<f64>>), SlideError> {
 }
 
 /// `None` without three neighbours.
-fn roughness(judge: &Judge, details: &[Option<Vec<[f32; 3]>>]) -> Option<Roughness> {
+fn roughness(evaluator: &Evaluator, details: &[Option<Vec<[f32; 3]>>]) -> Option<Roughness> {
     let (mut squares, mut max, mut n) = (0.0, 0.0_f64, 0);
     for triple in details.windows(3) {
         let [Some(a), Some(b), Some(c)] = triple else { continue };
         let second = |v: usize| std::array::from_fn(|k| a[v][k] - 2.0 * b[v][k] + c[v][k]);
         let field: Vec<[f32; 3]> = (0..b.len()).map(second).collect();
-        squares += judge.rms(&field).powi(2);
-        max = max.max(judge.largest(&field));
+        squares += evaluator.rms(&field).powi(2);
+        max = max.max(evaluator.largest(&field));
         n += 1;
     }
     (n > 0).then(|| Roughness { rms_mm: 1e3 * (squares / f64::from(n)).sqrt(), max_mm: 1e3 * max })

@@ -9,7 +9,7 @@ use plica_client::pattern::Pattern;
 use plica_client::protocol::{DEFAULT_ENDPOINT, DEFAULT_SESSION};
 use plica_client::{Client, ClientError, ClientOptions};
 
-/// Asks, drives, records and replays a running plicad.
+/// Queries, drives, records and replays a running plicad.
 #[derive(Debug, Parser)]
 #[command(name = "plica", version, about)]
 pub(crate) struct Args {
@@ -25,7 +25,7 @@ pub(crate) struct Common {
     /// Endpoint of the daemon.
     #[arg(long, global = true, default_value = DEFAULT_ENDPOINT)]
     pub(crate) connect: String,
-    /// Zenoh configuration file (JSON5) that says how to connect, in place of --connect.
+    /// Zenoh configuration file (JSON5) for the connection, in place of --connect.
     #[arg(long, global = true)]
     pub(crate) config: Option<PathBuf>,
     /// Session name of the daemon.
@@ -49,32 +49,32 @@ impl Common {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// What the daemon says about itself.
+    /// Show the status of the daemon.
     Status,
     /// Move a tool by a script or along a recorded trajectory.
     Probe(Probe),
     /// Write poses (and skins and wrenches) to an MCAP file until Ctrl-C.
     Record(Record),
-    /// Publish the poses of a recording again, byte by byte.
+    /// Publish the poses of a recording, byte by byte.
     Replay(Replay),
     /// Submit, watch and fetch long-running work: examples for enrichment.
     #[command(subcommand)]
     Jobs(jobs::Jobs),
     /// Call a method.
     Rpc(Rpc),
-    /// Measure the time from a pose to the force that follows from it.
+    /// Measure the time from a pose to the resulting force.
     Latency(Latency),
-    /// Write the mesh, or the skin as it is now, to a file.
+    /// Write the mesh or the present skin to a file.
     Export(Export),
 }
 
-/// Which tool, and where it moves.
+/// Tool and scripted motion.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Motion {
-    /// Tool to move; the only one of the scene if left out.
+    /// Tool to move; may be left out if the scene has one tool.
     #[arg(long)]
     pub(crate) tool: Option<String>,
-    /// Object to touch; the only one of the scene if left out.
+    /// Object to touch; may be left out if the scene has one object.
     #[arg(long)]
     pub(crate) object: Option<String>,
     /// Scripted motion.
@@ -86,10 +86,10 @@ pub(crate) struct Motion {
     /// Seconds to run.
     #[arg(long, default_value_t = 10.0, value_parser = positive)]
     pub(crate) seconds: f64,
-    /// Point of the surface to press on, `x,y,z`; above the middle of the object if left out.
+    /// Point of the surface to press on, `x,y,z` [default: above the middle of the object].
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     pub(crate) at_m: Option<[f64; 3]>,
-    /// How deep to press [default: 0.004; with --fit 0.008, at most 0.3 of the object's height].
+    /// Depth of the press in metres [default: 0.004; with --fit 0.008, at most 0.3 of the object's height].
     #[arg(long, value_parser = positive)]
     pub(crate) depth_m: Option<f64>,
     /// Radius of the tool's tip.
@@ -124,7 +124,7 @@ impl From<PatternName> for Pattern {
 pub(crate) struct Probe {
     #[command(flatten)]
     pub(crate) motion: Motion,
-    /// Trajectory (CSV or TUM) to follow at its own times, in place of a pattern.
+    /// Trajectory (CSV or TUM) to follow at its recorded times, in place of a pattern.
     #[arg(long, conflicts_with_all = ["pattern", "rate_hz", "seconds"])]
     pub(crate) poses: Option<PathBuf>,
     /// Scale and move the trajectory so that it presses the object, as plicad's --fit does; the tool starts upright.
@@ -136,7 +136,7 @@ pub(crate) struct Probe {
 pub(crate) struct Record {
     /// File to write.
     pub(crate) out: PathBuf,
-    /// Seconds to record; until Ctrl-C if left out.
+    /// Seconds to record [default: until Ctrl-C].
     #[arg(long, value_parser = positive)]
     pub(crate) seconds: Option<f64>,
     /// Stop after this many poses.
@@ -154,20 +154,20 @@ pub(crate) struct Record {
 pub(crate) struct Replay {
     /// Recording to play.
     pub(crate) file: PathBuf,
-    /// Times the original speed.
+    /// Factor on the recorded speed.
     #[arg(long, default_value_t = 1.0, value_parser = positive, conflicts_with = "fast")]
     pub(crate) speed: f64,
-    /// As fast as the bus takes them.
+    /// Publish as fast as the bus accepts poses.
     #[arg(long)]
     pub(crate) fast: bool,
-    /// Replace each source_id, so that a daemon that has seen these poses takes them again.
+    /// Replace each source_id, so that a daemon that has received these poses before accepts them again.
     #[arg(long)]
     pub(crate) new_source: bool,
 }
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Rpc {
-    /// reset, pause, resume, step, snapshot, restore, activate (with {"database": "JOB or PATH"}), or one about jobs: job_list, job_get, ...
+    /// reset, pause, resume, step, snapshot, restore, activate (with {"database": "JOB or PATH"}), or a method of jobs: job_list, job_get, ...
     pub(crate) method: String,
     /// Arguments as JSON.
     #[arg(default_value = "{}")]
@@ -182,7 +182,7 @@ pub(crate) struct Latency {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Export {
-    /// Object to write; the only one of the scene if left out.
+    /// Object to write; may be left out if the scene has one object.
     #[arg(long)]
     pub(crate) object: Option<String>,
     /// File for the mesh (GLB).

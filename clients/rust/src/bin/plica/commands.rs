@@ -1,4 +1,4 @@
-//! One file per command, and what they share.
+//! Commands, one file each, and their shared helpers.
 
 pub(crate) mod ask;
 pub(crate) mod export;
@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, bail};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
-/// Becomes true at Ctrl-C, so that files are ended and results printed.
+/// Set at Ctrl-C, so that a command finishes its files and prints its results.
 #[derive(Debug, Clone)]
 pub(crate) struct Stop(Arc<AtomicBool>);
 
@@ -38,7 +38,7 @@ impl Stop {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// Sleeps until an instant, waking up to look for signals. False if there was one.
+    /// Sleeps until an instant or a signal. False after a signal.
     pub(crate) fn sleep_until(&self, instant: Instant) -> bool {
         const LOOK: Duration = Duration::from_millis(50);
         while !self.is_set() {
@@ -52,7 +52,7 @@ impl Stop {
     }
 }
 
-/// The wanted name, or the only one there is.
+/// The given name if the scene has it; without a name, the only one.
 pub(crate) fn choose<T>(what: &str, wanted: Option<&str>, there: &BTreeMap<String, T>) -> anyhow::Result<String> {
     let names = there.keys().cloned().collect::<Vec<_>>().join(", ");
     match (wanted, there.keys().next()) {

@@ -1,4 +1,4 @@
-//! What the points of a chart are.
+//! Configurations that the chart compares.
 
 use plica_scene::Config;
 use plica_sim::ElementKind;
@@ -9,35 +9,41 @@ use toml::Value;
 
 /// Texels along a stamp's side.
 const TEXELS: [usize; 4] = [8, 16, 32, 64];
-/// Modes that stamps are kept as.
+/// Modes that stamps are compressed to.
 const MODES: [usize; 4] = [8, 16, 32, 128];
 
-/// One point to be.
+/// One configuration to measure.
 #[derive(Debug, Clone)]
 pub(super) struct Configuration {
-    /// Of the point.
+    /// Name of the point.
     pub(super) name: String,
-    /// What is varied, for the picture.
+    /// Parameter that is varied; one colour in the picture.
     pub(super) family: &'static str,
-    /// How it is measured.
+    /// Model and method.
     pub(super) what: What,
 }
 
-/// Table and key of the object, and the value there.
-pub(super) type Change = ([&'static str; 2], Value);
+/// Another value of a key in a table of the object.
+#[derive(Debug, Clone)]
+pub(super) struct Change {
+    pub(super) table: &'static str,
+    pub(super) key: &'static str,
+    pub(super) value: Value,
+}
 
+/// Model and method of a configuration.
 #[derive(Debug, Clone)]
 pub(super) enum What {
     /// The scene's coarse skin.
     Coarse,
     /// The scene's coarse model, enriched.
     Enriched {
-        /// How.
+        /// Method.
         method: Box<Method>,
-        /// From the first so many examples.
+        /// Number of training examples, from the first on.
         examples: usize,
     },
-    /// Another coarse model: what the scene's `coarse` and `skin` tables say otherwise.
+    /// Another coarse model: changes in the scene's `coarse` and `skin` tables.
     OtherCoarse(Vec<Change>),
 }
 
@@ -50,7 +56,7 @@ impl Configuration {
     }
 }
 
-/// All of them; `quick` leaves out other coarse models.
+/// All configurations; `quick` leaves out other coarse models.
 pub(super) fn configurations(config: &Config, setup: &Setup, n_examples: usize, quick: bool) -> Vec<Configuration> {
     let [coarse, method, of_examples, texels, modes, precision] = FAMILIES;
     let mut all = vec![Configuration { name: COARSE.to_owned(), family: coarse, what: What::Coarse }];
@@ -89,8 +95,9 @@ pub(super) fn configurations(config: &Config, setup: &Setup, n_examples: usize, 
     all
 }
 
-/// What a scene could have said instead.
+/// Other coarse models: element, substeps, tolerance, embedding, divisions.
 fn other_models(config: &Config) -> Vec<(String, Vec<Change>)> {
+    let change = |table, key, value| Change { table, key, value };
     let object = config.object();
     let element = match object.element() {
         ElementKind::EnhancedStrain => "full_integration",
@@ -99,15 +106,15 @@ fn other_models(config: &Config) -> Vec<(String, Vec<Change>)> {
     let divisions = |factor: f64| {
         let scaled = object.divisions().map(|n| ((factor * n as f64).round() as i64).max(1));
         let name = scaled.map(|n| n.to_string()).join("x");
-        (name, vec![(["coarse", "divisions"], Value::Array(scaled.map(Value::Integer).to_vec()))])
+        (name, vec![change("coarse", "divisions", Value::Array(scaled.map(Value::Integer).to_vec()))])
     };
     let substeps = i64::from(object.substeps()) * 2;
     let tolerance = 10.0 * object.solver().tolerance;
     let mut all = vec![
-        (element.replace('_', " "), vec![(["coarse", "element"], Value::String(element.to_owned()))]),
-        (format!("{substeps} substeps"), vec![(["coarse", "substeps"], Value::Integer(substeps))]),
-        (format!("tolerance {tolerance:.0e}"), vec![(["coarse.solver", "tolerance"], Value::Float(tolerance))]),
-        ("trilinear embedding".to_owned(), vec![(["skin", "embedding"], Value::String("trilinear".to_owned()))]),
+        (element.replace('_', " "), vec![change("coarse", "element", Value::String(element.to_owned()))]),
+        (format!("{substeps} substeps"), vec![change("coarse", "substeps", Value::Integer(substeps))]),
+        (format!("tolerance {tolerance:.0e}"), vec![change("coarse.solver", "tolerance", Value::Float(tolerance))]),
+        ("trilinear embedding".to_owned(), vec![change("skin", "embedding", Value::String("trilinear".to_owned()))]),
     ];
     all.extend([0.75, 1.5, 2.0].map(divisions));
     all

@@ -1,11 +1,11 @@
-//! From a configuration to a point.
+//! Measures one point of the chart.
 
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::ops::ControlFlow;
 
 use anyhow::Context;
 use plica_scene::Config;
 use plica_scene::setup::setup;
-use plica_training::evaluation::{Judge, Verdict, other_coarse};
+use plica_training::evaluation::{EvaluationProgress, Evaluator, MethodEvaluation, other_coarse};
 use plica_training::{Database, Setup};
 use toml::Value;
 
@@ -13,63 +13,71 @@ use super::configuration::{Change, Configuration, What};
 use super::points::Point;
 use crate::commands::bench::bench;
 
-/// What all points are measured with.
+/// Called with the name of each step of a measurement.
+pub(super) type StepObserver<'a> = &'a mut (dyn FnMut(&str) + Send);
+
+/// Inputs that all points share.
 pub(super) struct Bench<'a> {
     pub(super) config: &'a Config,
     pub(super) setup: &'a Setup,
     pub(super) held_out: &'a Database,
-    pub(super) judge: &'a Judge,
+    pub(super) evaluator: &'a Evaluator,
     pub(super) ticks: u64,
 }
 
 impl Bench<'_> {
-    /// `simulation_us` is the tick of the scene's own coarse model, once it is known. `said` hears of parts that take long.
+    /// Measures one configuration. `simulation_us` is the tick of the scene's own coarse model, once it is known; `observer` is
+    /// called at each step of a long measurement.
     pub(super) fn measure(
         &self,
         configuration: &Configuration,
         simulation_us: Option<f64>,
-        said: &(dyn Fn(&str) + Sync),
+        observer: StepObserver<'_>,
     ) -> anyhow::Result<Point> {
         match &configuration.what {
-            What::Coarse => self.of_verdict(configuration, &self.judge.coarse()?, tick_us(self.config, self.ticks)?),
+            What::Coarse => {
+                self.of_evaluation(configuration, &self.evaluator.coarse()?, tick_us(self.config, self.ticks)?)
+            }
             What::Enriched { method, examples } => {
                 let simulation_us = simulation_us.context("the coarse model comes first")?;
-                self.of_verdict(configuration, &self.judge.judge(method, *examples)?, simulation_us)
+                self.of_evaluation(configuration, &self.evaluator.evaluate(method, *examples)?, simulation_us)
             }
-            What::OtherCoarse(changes) => self.of_other(configuration, changes, said),
+            What::OtherCoarse(changes) => self.of_other(configuration, changes, observer),
         }
     }
 
-    fn of_verdict(&self, of: &Configuration, verdict: &Verdict, simulation_us: f64) -> anyhow::Result<Point> {
-        let independent = verdict.in_region.independent_mm;
+    fn of_evaluation(&self, of: &Configuration, found: &MethodEvaluation, simulation_us: f64) -> anyhow::Result<Point> {
+        let independent = found.in_region.independent_mm;
         let independent =
             independent.context("the held-out set lacks the accurate model's own contact; train it again")?;
         Ok(Point {
             name: of.name.clone(),
             family: of.family.to_owned(),
-            correlator: verdict.correlator.clone(),
-            interpolator: verdict.interpolator.clone(),
-            examples: verdict.examples,
+            correlator: found.correlator.clone(),
+            interpolator: found.interpolator.clone(),
+            examples: found.examples,
             simulation_us,
-            enrichment_us: verdict.tick_us,
+            enrichment_us: found.tick_us,
             independent_mm: independent.median,
             independent_p95_mm: independent.p95,
-            tied_mm: Some(verdict.in_region.median_mm),
-            states: verdict.in_region.states,
+            tied_mm: Some(found.in_region.median_mm),
+            states: found.in_region.states,
             failed_states: 0,
             on_front: false,
         })
     }
 
-    fn of_other(&self, of: &Configuration, changes: &[Change], said: &(dyn Fn(&str) + Sync)) -> anyhow::Result<Point> {
+    fn of_other(&self, of: &Configuration, changes: &[Change], observer: StepObserver<'_>) -> anyhow::Result<Point> {
         let config = changed(self.config, changes)?;
-        said("ticks");
+        observer("ticks");
         let simulation_us = tick_us(&config, self.ticks)?;
-        let (other, total) = (setup(&config)?, self.judge.n_states()[0]);
+        let other = setup(&config)?;
         let n_threads = std::thread::available_parallelism().map_or(1, usize::from);
-        let done = AtomicUsize::new(0);
-        let tell = || said(&format!("{} of {total} interactions", done.fetch_add(1, Relaxed) + 1));
-        let found = other_coarse(self.setup, self.held_out, &other, n_threads, (&tell, &|| false))?;
+        let mut observe = |p: EvaluationProgress<'_>| {
+            observer(&format!("{} of {} {}", p.done, p.all, p.part));
+            ControlFlow::Continue(())
+        };
+        let found = other_coarse(self.setup, self.held_out, &other, n_threads, &mut observe)?;
         Ok(Point {
             name: of.name.clone(),
             family: of.family.to_owned(),
@@ -99,10 +107,10 @@ fn tick_us(config: &Config, ticks: u64) -> anyhow::Result<f64> {
     Ok(bench(config, motion, ticks)?.tick_us.p50)
 }
 
-/// The scene with other values in tables of its object.
+/// The scene with `changes` in the tables of its object.
 fn changed(config: &Config, changes: &[Change]) -> anyhow::Result<Config> {
     let mut document: toml::Table = config.text().parse()?;
-    for ([table, key], value) in changes {
+    for Change { table, key, value } in changes {
         let path = ["objects", config.object().name()].into_iter().chain(table.split('.'));
         let mut at = &mut document;
         for name in path {

@@ -17,11 +17,11 @@ use labels::{Box2, place};
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// Of the picture \[px\].
+/// Width and height of the picture \[px\].
 const SIZE: (u32, u32) = (1060, 620);
-/// Left, top, right and bottom of what is drawn in \[px\].
+/// Left, top, right and bottom of the plot \[px\].
 const FRAME: [f64; 4] = [74.0, 56.0, 700.0, 560.0];
-/// Where the lists stand \[px\].
+/// Left edge of the lists \[px\].
 const LISTS_X: i32 = 724;
 const COLOURS: [RGBColor; FAMILIES.len()] = [
     RGBColor(90, 90, 90),
@@ -32,10 +32,21 @@ const COLOURS: [RGBColor; FAMILIES.len()] = [
     RGBColor(190, 150, 0),
 ];
 const FRONT: RGBColor = RGBColor(200, 30, 45);
-/// From what is measured to pixels.
+
+/// Points and the front in the picture.
+struct Plotted<'a> {
+    drawn: &'a [&'a Point],
+    /// By rising time.
+    front: &'a [&'a Point],
+    /// Corners of the line along the front \[px\].
+    stairs: &'a [(f64, f64)],
+}
+
+/// Logarithmic scales: values to pixels.
 struct Scales {
-    /// Least and largest \[us\], \[mm\].
+    /// Range \[us\].
     x: [f64; 2],
+    /// Range \[mm\].
     y: [f64; 2],
 }
 
@@ -67,7 +78,7 @@ fn paint(chart: &Chart, file: &Path) -> Result<(), Box<dyn std::error::Error>> {
             area.draw(&Circle::new((x as i32, y as i32), 7, FRONT.stroke_width(2)))?;
         }
     }
-    name_points(&area, &scales, (&drawn, &front, &stairs))?;
+    name_points(&area, &scales, &Plotted { drawn: &drawn, front: &front, stairs: &stairs })?;
     lists(&area, chart, &front)?;
     if !slow.is_empty() {
         let names: Vec<_> = slow.iter().map(|p| format!("{} ({:.1} ms)", p.name, 1e-3 * p.tick_us())).collect();
@@ -78,7 +89,7 @@ fn paint(chart: &Chart, file: &Path) -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// By rising time.
+/// Points of the front that are drawn, by rising time.
 fn drawn_front<'a>(chart: &Chart, drawn: &[&'a Point]) -> Vec<&'a Point> {
     chart.front.iter().filter_map(|name| drawn.iter().find(|p| p.name == *name).copied()).collect()
 }
@@ -145,7 +156,7 @@ fn grid(area: &Area<'_>, scales: &Scales) -> Result<(), Box<dyn std::error::Erro
     Ok(())
 }
 
-/// Corners of what is reached at least within a time.
+/// Corners of the front as a staircase: the least error within a time.
 fn staircase(scales: &Scales, front: &[&Point]) -> Vec<(f64, f64)> {
     let mut corners: Vec<(f64, f64)> = Vec::new();
     for p in front {
@@ -158,11 +169,8 @@ fn staircase(scales: &Scales, front: &[&Point]) -> Vec<(f64, f64)> {
 }
 
 /// Numbers at the points of the front; names at others where there is room.
-fn name_points(
-    area: &Area<'_>,
-    scales: &Scales,
-    (drawn, front, stairs): (&[&Point], &[&Point], &[(f64, f64)]),
-) -> Result<(), Box<dyn std::error::Error>> {
+fn name_points(area: &Area<'_>, scales: &Scales, plotted: &Plotted<'_>) -> Result<(), Box<dyn std::error::Error>> {
+    let Plotted { drawn, front, stairs } = plotted;
     let radius = |p: &Point| if p.on_front { 9.0 } else { 5.0 };
     let mut taken: Vec<Box2> = drawn.iter().map(|p| Box2::around(scales.pixel(p), [radius(p); 2])).collect();
     taken.extend(stairs.windows(2).map(|pair| Box2::spanning(pair[0], pair[1])));
@@ -182,7 +190,7 @@ fn name_points(
     Ok(())
 }
 
-/// Colours, and the points of the front, beside the picture.
+/// Legend of the colours and list of the front, right of the plot.
 fn lists(area: &Area<'_>, chart: &Chart, front: &[&Point]) -> Result<(), Box<dyn std::error::Error>> {
     let x = f64::from(LISTS_X);
     let mut y = FRAME[1];

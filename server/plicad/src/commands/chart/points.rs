@@ -1,4 +1,4 @@
-//! Measured points, in a file that an interrupted run goes on with.
+//! Measured points, saved so that an interrupted run can continue.
 
 use std::path::Path;
 
@@ -14,15 +14,15 @@ use super::configuration::Configuration;
 pub(super) struct Chart {
     /// Name of the scene.
     pub(super) scene: String,
-    /// What all points depend on.
+    /// Digest of everything that all points depend on.
     pub(super) identity: String,
     /// Length of a tick in simulated time \[us\].
     pub(super) timestep_us: f64,
-    /// States that errors are medians of.
+    /// Number of states that errors are taken over.
     pub(super) held_out_states: usize,
-    /// Name of the point that a scene gets by default.
+    /// Name of the default method.
     pub(super) default: String,
-    /// Names of the points that none is both faster and more accurate than, by time.
+    /// Names of the points on the front, by rising time: no other point is both faster and more accurate.
     pub(super) front: Vec<String>,
     /// In the order of the list of configurations.
     pub(super) points: Vec<Point>,
@@ -32,7 +32,7 @@ pub(super) struct Chart {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Point {
     pub(super) name: String,
-    /// What is varied.
+    /// Parameter that is varied.
     pub(super) family: String,
     pub(super) correlator: String,
     pub(super) interpolator: String,
@@ -47,11 +47,11 @@ pub(super) struct Point {
     pub(super) independent_p95_mm: f64,
     /// Median RMS error against `tied` \[mm\]; another coarse model has another tie.
     pub(super) tied_mm: Option<f64>,
-    /// States of the median.
+    /// Number of states in the median.
     pub(super) states: usize,
     /// States where another coarse model did not come to rest.
     pub(super) failed_states: usize,
-    /// Whether none is both faster and more accurate.
+    /// No other point is both faster and more accurate.
     pub(super) on_front: bool,
 }
 
@@ -63,7 +63,7 @@ impl Point {
 }
 
 impl Chart {
-    /// Goes on with the points of `file` if they are of the same `identity`, and not `fresh` ones are asked for.
+    /// Opens the points of `file`; empty with `fresh`, without a file, or where their `identity` is another one.
     pub(super) fn open(file: &Path, scene: &str, identity: &str, fresh: bool) -> anyhow::Result<Self> {
         let new = Self {
             scene: scene.to_owned(),
@@ -80,11 +80,11 @@ impl Chart {
         let name = || file.display().to_string();
         let bytes = std::fs::read(file).with_context(name)?;
         let old: Self = serde_json::from_slice(&bytes)
-            .with_context(|| format!("{}: is no chart; remove it, or measure anew with --fresh", name()))?;
+            .with_context(|| format!("{}: is not a chart; remove it, or measure again with --fresh", name()))?;
         if old.identity == identity {
             return Ok(old);
         }
-        tracing::warn!("{}: scene, databases or ticks were others; all points are measured anew", name());
+        tracing::warn!("{}: scene, databases or ticks have changed; all points are measured again", name());
         Ok(new)
     }
 
@@ -97,7 +97,7 @@ impl Chart {
         self.points.iter().find(|p| p.name == COARSE).map(|p| p.simulation_us)
     }
 
-    /// Drops points that are no longer asked for.
+    /// Drops points without a configuration.
     pub(super) fn keep_only(&mut self, all: &[Configuration]) {
         self.points.retain(|p| all.iter().any(|c| c.name == p.name));
     }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use plica_jobs::by_hand::{JobRequest, make};
+use plica_jobs::by_hand::{JobOptions, make};
 use plica_scene::Config;
 use plica_scene::hash::scene_hash;
 use plica_training::{Database, DatabaseKind, JobPaths};
@@ -22,7 +22,7 @@ pub(super) fn examples(config: &Config, out: &Path, n: u32) -> anyhow::Result<Tr
     }
     let n_threads = std::thread::available_parallelism().map_or(1, usize::from);
     let request =
-        JobRequest { kind: DatabaseKind::Training, examples: Some(n), seed: None, threads: u32::try_from(n_threads)? };
+        JobOptions { kind: DatabaseKind::Training, examples: Some(n), seed: None, threads: u32::try_from(n_threads)? };
     let (folder, job) = make(&root, config, &request)?;
     eprintln!("trains {n} examples in {}, once", root.display());
     let watch = OnTerminal::new(None);
@@ -36,7 +36,7 @@ pub(super) fn examples(config: &Config, out: &Path, n: u32) -> anyhow::Result<Tr
     })
 }
 
-/// Another scene, or another number, is another folder: nothing in it is ever out of date.
+/// Folder by scene hash and number of examples, so that its content is never out of date.
 fn folder(out: &Path, hash: &str, n: u32) -> PathBuf {
     out.join("demo-training").join(format!("{}-{n}", hash.get(..12).unwrap_or(hash)))
 }

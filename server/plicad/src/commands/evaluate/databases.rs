@@ -1,4 +1,4 @@
-//! The databases of a scene, where `plicad train` leaves them or where somebody says.
+//! The two databases of an evaluation: the files given, or those that `plicad train` writes by default.
 
 use std::path::{Path, PathBuf};
 
@@ -8,15 +8,19 @@ use plica_training::{Database, DatabaseKind, JobPaths, Setup};
 use crate::cli::DatabaseArgs;
 use crate::commands::train::default_folder;
 
-/// Examples to learn from, and those to judge by.
+/// The two databases of an evaluation.
+pub(in crate::commands) struct Databases {
+    /// Examples to train methods on.
+    pub(in crate::commands) training: Database,
+    /// Held-out examples.
+    pub(in crate::commands) held_out: Database,
+}
+
+/// Reads and checks both databases.
 ///
 /// # Errors
 /// A file is missing, damaged, or belongs to another scene.
-pub(in crate::commands) fn read(
-    config: &Config,
-    setup: &Setup,
-    args: &DatabaseArgs,
-) -> anyhow::Result<(Database, Database)> {
+pub(in crate::commands) fn read(config: &Config, setup: &Setup, args: &DatabaseArgs) -> anyhow::Result<Databases> {
     let read = |given: &Option<PathBuf>, kind| {
         let path = given.clone().unwrap_or_else(|| default_path(config, kind));
         if !path.exists() {
@@ -36,14 +40,17 @@ pub(in crate::commands) fn read(
         );
         Ok(database)
     };
-    Ok((read(&args.training, DatabaseKind::Training)?, read(&args.held_out, DatabaseKind::Evaluation)?))
+    Ok(Databases {
+        training: read(&args.training, DatabaseKind::Training)?,
+        held_out: read(&args.held_out, DatabaseKind::Evaluation)?,
+    })
 }
 
 fn default_path(config: &Config, kind: DatabaseKind) -> PathBuf {
     JobPaths::new(default_folder(config, kind)).database()
 }
 
-/// What makes the file that is missing.
+/// Command that makes the missing file.
 fn command(config: &Config, kind: DatabaseKind, path: &Path, given: &Option<PathBuf>) -> String {
     let file = config.file();
     let scene = if file.exists() { file.display().to_string() } else { config.name().to_owned() };

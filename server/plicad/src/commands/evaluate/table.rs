@@ -1,6 +1,6 @@
-//! What an evaluation found, for people.
+//! Tables of an evaluation, for people.
 
-use plica_training::evaluation::{Evaluation, Group, Judgement, Quantiles, Roughness, Slide, Verdict};
+use plica_training::evaluation::{Evaluation, Group, MethodEvaluation, MethodReport, Quantiles, Roughness, Slide};
 
 pub(super) fn print(scene: &str, found: &Evaluation) {
     let n = found.held_out;
@@ -13,9 +13,9 @@ pub(super) fn print(scene: &str, found: &Evaluation) {
         "{:<27} {:>4} {:^17} {:>6} {:>6} {:^17} {:^17} {:^17} {:>6}",
         "method", "n", "E in region", "tied", "indep.", "E near contact", "worst vertex", "E outside", "us"
     );
-    found.methods.iter().for_each(|m| row(&m.verdict, &found.default));
+    found.methods.iter().for_each(|m| row(&m.evaluation, &found.default));
     println!("outside, by kind: E");
-    found.methods.iter().for_each(|m| kinds(&m.verdict));
+    found.methods.iter().for_each(|m| kinds(&m.evaluation));
     println!(
         "degenerate inputs: RMS of the detail over that of d[i], median; E in region with the training set taken twice"
     );
@@ -23,7 +23,7 @@ pub(super) fn print(scene: &str, found: &Evaluation) {
     found.methods.iter().for_each(degenerate);
     println!("rank correlation of 1 - confidence with E");
     println!("{:<27} {:>10} {:>10}", "method", "in region", "all");
-    let ranked = found.methods.iter().map(|m| &m.verdict).filter(|v| v.confidence_rank.is_some());
+    let ranked = found.methods.iter().map(|m| &m.evaluation).filter(|v| v.confidence_rank.is_some());
     ranked.for_each(|v| {
         println!("{:<27} {:>10} {:>10}", v.name, rank(v.confidence_rank_in_region), rank(v.confidence_rank))
     });
@@ -46,7 +46,7 @@ fn print_slide(slide: &Slide) {
     slide.methods.iter().for_each(|m| row(&m.name, &m.roughness, &m.error.as_ref().map_or_else(String::new, three)));
 }
 
-fn row(v: &Verdict, default: &str) {
+fn row(v: &MethodEvaluation, default: &str) {
     let mark = if v.name == default { "*" } else { "" };
     let independent = v.in_region.independent_median_mm.map_or("-".into(), |mm| format!("{mm:.3}"));
     println!(
@@ -63,19 +63,19 @@ fn row(v: &Verdict, default: &str) {
     );
 }
 
-fn kinds(v: &Verdict) {
+fn kinds(v: &MethodEvaluation) {
     let of_kind = |(kind, group): (&String, &Group)| format!("{kind} {}", ratios(group));
     let outside = v.kinds.iter().filter(|(kind, _)| *kind != plica_training::IN_REGION);
     println!("{:<27} {}", v.name, outside.map(of_kind).collect::<Vec<_>>().join("  "));
 }
 
-fn degenerate(m: &Judgement) {
+fn degenerate(m: &MethodReport) {
     let Some(d) = &m.degenerate else { return };
     let [at_rest, reversed, doubled, quadrupled] =
         [d.at_rest, d.reversed, d.doubled, d.quadrupled].map(|q| format!("{:.2}", q.median));
     println!(
         "{:<27} {at_rest:>8} {reversed:>8} {doubled:>8} {quadrupled:>8}   {}",
-        m.verdict.name,
+        m.evaluation.name,
         ratios(&d.duplicated)
     );
 }

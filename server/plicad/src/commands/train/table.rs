@@ -1,4 +1,4 @@
-//! What a finished job did, for people.
+//! Report of a finished job, for people.
 
 use std::path::Path;
 

@@ -9,10 +9,10 @@ use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 use plica_training::{TrainingProgress, TrainingReport, TrainingStage};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
-/// At least this long between two lines of a log.
+/// Least time between two lines of a log.
 const LOG_INTERVAL: Duration = Duration::from_secs(30);
 
-/// Set once somebody asks the process to end.
+/// Set once a signal has asked the process to end.
 #[derive(Debug, Clone)]
 pub(in crate::commands) struct Ending(Arc<AtomicBool>);
 
@@ -34,7 +34,7 @@ impl Ending {
 /// A progress bar.
 #[derive(Debug)]
 pub(in crate::commands) struct OnTerminal {
-    /// Without one, signals end the process as they do by themselves.
+    /// `None` leaves the default action of signals.
     ending: Option<Ending>,
     bar: ProgressBar,
 }

@@ -1,4 +1,4 @@
-//! What a scene says about enrichment, as typed.
+//! Enrichment of a scene, as typed.
 
 #![allow(rustdoc::broken_intra_doc_links, reason = "units in brackets; the schema shows this text as it is")]
 
@@ -6,12 +6,12 @@ use plica_sim::enrichment::DEFAULT_METHOD;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// How examples become detail on the skin. Lengths are in coarse cells: detail is what the coarse mesh misses below them.
+/// Enrichment method and its options. Lengths are in coarse cells, since detail is the part of the deformation below their size.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawEnrichment {
-    /// Examples to start with, as `plicad train` leaves them: path relative to the scene file. Left out: the plain coarse skin
-    /// until a database is activated.
+    /// Database to start with, as `plicad train` writes it; path relative to the scene file. Left out: the plain coarse skin until
+    /// a database is activated.
     pub database: Option<String>,
     /// Name of a method, as `plicad evaluate` measures it: `kriging-stamp` (the default), `kriging-blend`, `ssh12-vector`, `rescale`,
     /// ...; an unknown name lists all. Or its family alone: `kriging`, `ssh12`, `linear`, `ridge`, `harmonic`, `rbf`, `rescale`.
@@ -29,21 +29,21 @@ pub struct RawEnrichment {
     /// Modes that the examples' detail is reduced to; as many as examples or more keep the examples.
     #[schemars(range(min = 1, max = 100_000))]
     pub modes: Option<u32>,
-    /// Whether detail that the examples do not cover fades to the coarse skin.
+    /// Whether detail fades to the coarse skin where examples do not cover the state.
     pub fade: Option<bool>,
 }
 
-/// How detail is laid on the skin.
+/// Interpolation of detail on the skin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RawInterpolation {
-    /// Moved along with the contact point, in a chart around it.
+    /// Stamp: moved with the contact point, in a chart around it.
     Stamp,
-    /// Where the examples have it, vertex by vertex.
+    /// Vector: at the place of the examples, vertex by vertex.
     Vector,
     /// A stamp near the contact point, vectors beyond.
     Blend,
-    /// A stamp near the contact point, each example's own place beyond.
+    /// A stamp near the contact point, the place of each example beyond.
     Warp,
 }
 

@@ -11,7 +11,7 @@ use super::{LARGEST_M, RawBox, RawFile};
 /// Most interactions of a set.
 const MAX_EXAMPLES: u32 = 100_000;
 
-/// Quasi-static model that examples are made with. Supports and regions are the object's.
+/// Quasi-static model of the examples. Supports and regions are the object's.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawAccurate {
@@ -41,7 +41,7 @@ pub enum RawMaterialModel {
     Linear,
 }
 
-/// How the accurate skin is tied to the imprint of the tool on the coarse one.
+/// Tie of the accurate skin to the imprint of the tool on the coarse skin.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawTie {
@@ -67,7 +67,7 @@ pub struct RawTraining {
     pub examples: u32,
     /// Seed of the interactions.
     pub seed: u64,
-    /// How interactions are chosen among those that are drawn.
+    /// Sampling of the interactions.
     pub sampling: RawInteractionSampling,
     /// Farthest-point sampling: candidates drawn for each example kept.
     #[schemars(range(min = 2, max = 1000))]
@@ -75,7 +75,7 @@ pub struct RawTraining {
     /// Farthest-point sampling: length scales of contact points, and of presses and drags [m].
     #[schemars(inner(range(min = 1e-6, max = 10.0)))]
     pub feature_scales_m: [f64; 2],
-    /// Boxes on the resting skin that contact points lie in; none: wherever the skin faces the tool.
+    /// Boxes around the contact points on the resting skin; none: wherever the skin faces the tool.
     pub contact_regions: Vec<RawBox>,
     /// Direction of the press: "vertical" (down), "normal" (against the skin), or x, y, z. The tool's z axis points the other way.
     pub approach: RawApproach,
@@ -90,22 +90,22 @@ pub struct RawTraining {
     pub drag_share: f64,
     /// States picked from a recorded motion, in place of drawn ones.
     pub recorded: Option<RawRecorded>,
-    /// Axis along whose tangential part stamps are laid out, and one that stands in where it is normal to the skin.
+    /// First axis of stamps, projected to the tangent plane, and its replacement where it is normal to the skin.
     #[schemars(inner(inner(range(min = -LARGEST_M, max = LARGEST_M))))]
     pub stamp_axes: [[f64; 3]; 2],
-    /// How the real-time model is driven to a pose.
+    /// Drive of the real-time model to a pose.
     pub drive: RawDrive,
     /// Interactions kept apart from training.
     pub evaluation: RawEvaluation,
 }
 
-/// How interactions are chosen.
+/// Sampling of interactions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RawInteractionSampling {
     /// Farthest-point sampling among the candidates.
     FarthestPoint,
-    /// As they are drawn.
+    /// All candidates, as drawn.
     Random,
 }
 
@@ -135,19 +135,19 @@ pub enum RawApproachName {
 pub struct RawRecorded {
     /// Poses, as `plicad simulate` reads them: CSV or a TUM trajectory. Path relative to the scene file.
     pub file: RawFile,
-    /// Whether the trajectory's box is mapped into the room above the object.
+    /// Whether the trajectory's box is mapped into the workspace above the object.
     #[serde(default)]
     pub fit: bool,
 }
 
-/// How the real-time model is driven to a pose, and when it counts as settled.
+/// Drive of the real-time model to a pose, and criterion of settling.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawDrive {
     /// Speed of the tool [m/s].
     #[schemars(range(min = 1e-3, max = 1.0))]
     pub speed_m_per_s: f64,
-    /// Least damping proportional to mass while training [1/s]; what is at rest does not depend on it.
+    /// Least damping proportional to mass while training [1/s]; states at rest do not depend on it.
     #[schemars(range(min = 0.0, max = 1e3))]
     pub mass_damping_per_s: f64,
     /// Largest displacement within `window_s` of an object that counts as settled [m].
@@ -168,7 +168,7 @@ pub struct RawDrive {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawEvaluation {
-    /// Interactions drawn at random as those of training are.
+    /// Interactions drawn at random, as in training.
     #[schemars(range(min = 1, max = MAX_EXAMPLES))]
     pub examples: u32,
     /// Seed; another one than that of training.
@@ -189,7 +189,7 @@ pub struct RawOutside {
     /// Interactions.
     #[schemars(range(min = 1, max = MAX_EXAMPLES))]
     pub examples: u32,
-    /// Boxes on the resting skin that contact points lie in.
+    /// Boxes around the contact points on the resting skin.
     pub contact_regions: Option<Vec<RawBox>>,
     /// Direction of the press.
     pub approach: Option<RawApproach>,

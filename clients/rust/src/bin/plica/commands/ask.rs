@@ -10,7 +10,8 @@ use crate::output::Output;
 
 pub(crate) fn status(client: &Client, output: Output) -> anyhow::Result<()> {
     let value = client.status_json()?;
-    let status: Status = serde_json::from_value(value.clone()).context("the daemon's status has another shape")?;
+    let status: Status =
+        serde_json::from_value(value.clone()).context("the daemon's status does not have the expected form")?;
     output.result(&value, &table(&status));
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! `export`: the mesh, or the skin as it is now.
+//! `export`: the mesh or the present skin.
 
 use std::path::Path;
 

@@ -24,7 +24,7 @@ pub(crate) fn run(client: &Client, jobs: &Jobs, output: Output) -> anyhow::Resul
         Jobs::Watch(watch) => watch::run(client, watch.id.as_deref(), output),
         Jobs::Cancel(which) => {
             let job = client.cancel_job(&which.id)?;
-            said(&job, &format!("job {0} is cancelled; `plica jobs resume {0}` would go on with it", job.id), output)
+            report(&job, &format!("job {0} is cancelled; `plica jobs resume {0}` continues it", job.id), output)
         }
         Jobs::Resume(resume) => self::resume(client, resume, output),
         Jobs::Fetch(fetch) => fetch::run(client, fetch, output),
@@ -47,7 +47,7 @@ fn submit(client: &Client, submit: &Submit, output: Output) -> anyhow::Result<Ex
     let reply = client.submit_job(&request(submit)?)?;
     let (job, id) = (&reply.job, &reply.job.id);
     if !reply.created {
-        output.note(&format!("`{}` has been submitted before, as job {id}", job.client_id));
+        output.note(&format!("`{}` was submitted before, as job {id}", job.client_id));
     }
     if submit.watch {
         return watch::run(client, Some(id), output);
@@ -83,10 +83,10 @@ fn resume(client: &Client, resume: &Resume, output: Output) -> anyhow::Result<Ex
     if resume.watch {
         return watch::run(client, Some(&job.id), output);
     }
-    said(&job, &format!("job {0} is queued again; `plica jobs watch {0}` shows its progress", job.id), output)
+    report(&job, &format!("job {0} is queued again; `plica jobs watch {0}` shows its progress", job.id), output)
 }
 
-fn said(job: &Job, text: &str, output: Output) -> anyhow::Result<ExitCode> {
+fn report(job: &Job, text: &str, output: Output) -> anyhow::Result<ExitCode> {
     output.result(&json!(job), text);
     Ok(ExitCode::SUCCESS)
 }

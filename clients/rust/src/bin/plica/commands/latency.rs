@@ -15,9 +15,9 @@ use crate::output::{Output, progress};
 
 const UPRIGHT: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 const WRENCHES_WAITING: usize = 8192;
-/// After the last pose, how long an echo may still come.
+/// Wait for echoes after the last pose.
 const LAST_ECHO: Duration = Duration::from_millis(200);
-/// One minute; longer is cut to it.
+/// Largest recorded latency, one minute; longer ones count as this.
 const MOST_NS: u64 = 60_000_000_000;
 
 pub(crate) fn run(client: &Client, latency: &Latency, output: Output) -> anyhow::Result<()> {
@@ -49,7 +49,7 @@ pub(crate) fn run(client: &Client, latency: &Latency, output: Output) -> anyhow:
     report(&echoes.histogram, &plan.tool, published, output)
 }
 
-/// The first echo of each source time.
+/// First echo of each source time.
 struct Echoes {
     histogram: Histogram<u64>,
     newest_ns: u64,
@@ -61,7 +61,7 @@ impl Echoes {
         Ok(Self { histogram, newest_ns: start_ns })
     }
 
-    /// Source times before `start_ns` belong to poses of others and are left out.
+    /// Source times before `start_ns` belong to other publishers and are left out.
     fn collect(&mut self, wrenches: &Subscription<WrenchMessage>, clock: SourceClock) {
         while let Some(WrenchMessage { wrench, received }) = wrenches.try_next() {
             let (sent_ns, received_ns) = (wrench.pose_source_time_ns, clock.at_ns(received));
@@ -75,7 +75,7 @@ impl Echoes {
 
 fn report(histogram: &Histogram<u64>, tool: &str, published: u64, output: Output) -> anyhow::Result<()> {
     if histogram.is_empty() {
-        bail!("no wrench of `{tool}` echoed a pose: `plica status` tells whether they are rejected");
+        bail!("no wrench of `{tool}` echoed a pose: `plica status` shows whether they are rejected");
     }
     let us = |ns: u64| ns as f64 / 1e3;
     let at = |quantile: f64| us(histogram.value_at_quantile(quantile));

@@ -1,4 +1,4 @@
-//! Where a scripted tool moves: asked from the daemon, unless the command line says it.
+//! Motion of a scripted tool, from the command line and the scene of the daemon.
 
 use anyhow::Context;
 use plica_client::Client;
@@ -9,12 +9,12 @@ use plica_trajectory::Terrain;
 use super::choose;
 use crate::args::Motion;
 
-/// How far above first touch a pattern starts.
+/// Start of a pattern above first touch \[m\].
 const CLEARANCE_M: f64 = 0.015;
-/// How deep a pattern presses, unless told otherwise.
+/// Default depth of a pattern \[m\].
 const DEPTH_M: f64 = 0.004;
 
-/// A tool, its way, and what is under it.
+/// A tool, its pattern, and the surface below.
 pub(crate) struct Plan {
     pub(crate) tool: String,
     pub(crate) path: Path,
@@ -38,7 +38,7 @@ pub(crate) fn plan(client: &Client, motion: &Motion) -> anyhow::Result<Plan> {
     Ok(Plan { tool, path, terrain })
 }
 
-/// The object's top in its middle; as high as its highest point where it has a hole there.
+/// Top of the object in its middle; its highest point where it has a hole there.
 fn surface_above_middle(terrain: &Terrain) -> [f64; 3] {
     let bounds = terrain.bounds();
     let [x, y] = [0, 1].map(|i| 0.5 * (bounds.min_m[i] + bounds.max_m[i]));

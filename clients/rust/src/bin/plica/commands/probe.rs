@@ -15,9 +15,9 @@ use crate::output::{Output, progress};
 
 const UPRIGHT: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 const WRENCHES_WAITING: usize = 4096;
-/// After the last pose, how long its answer may still take.
+/// Wait for wrenches after the last pose.
 const LAST_ANSWER: Duration = Duration::from_millis(200);
-/// Without a wrench for this long, the probe asks whether the daemon is still there.
+/// Time without a wrench after which the probe queries the daemon.
 const SILENCE: Duration = Duration::from_secs(1);
 
 pub(crate) fn run(client: &Client, probe: &Probe, output: Output) -> anyhow::Result<()> {
@@ -47,7 +47,7 @@ pub(crate) fn run(client: &Client, probe: &Probe, output: Output) -> anyhow::Res
             answered = Instant::now();
         }
         if answered.elapsed() > SILENCE {
-            // A paused daemon is silent too; one that is gone does not say so either.
+            // Silence alone does not tell a paused daemon from a stopped one.
             client.status()?;
             answered = Instant::now();
         }
@@ -70,7 +70,7 @@ pub(crate) fn run(client: &Client, probe: &Probe, output: Output) -> anyhow::Res
     Ok(())
 }
 
-/// What came back.
+/// Wrenches received.
 #[derive(Default)]
 struct Answers {
     newest_n: f64,

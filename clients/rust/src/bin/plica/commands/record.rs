@@ -1,4 +1,4 @@
-//! `record`: what is published, into an MCAP file.
+//! `record`: published messages to an MCAP file.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -12,7 +12,7 @@ use super::Stop;
 use crate::args::Record;
 use crate::output::{Output, progress};
 
-/// About two seconds of everything; a full queue drops what arrives, and says so.
+/// Queue of about two seconds of all streams; a full queue drops and counts new messages.
 const WAITING: usize = 4096;
 const LOOK: Duration = Duration::from_millis(50);
 const POSE: &str = "pose";
@@ -28,7 +28,7 @@ pub(crate) fn run(client: &Client, record: &Record, output: Output) -> anyhow::R
     if client.status().is_err() {
         output.note("no plicad serves this session; recording what others publish");
     }
-    // Scripts wait for this line: the question above has travelled behind the subscription.
+    // Scripts wait for this line; the query above was sent after the subscription, so that is active now.
     output.note(&format!("recording to {}", record.out.display()));
     let bar = progress(None, "messages");
     let start = Instant::now();
@@ -41,7 +41,7 @@ pub(crate) fn run(client: &Client, record: &Record, output: Output) -> anyhow::R
             bar.inc(1);
         }
     }
-    // What waits at the end belongs to the recording; what goes on arriving does not.
+    // Messages that wait at the end belong to the recording, later ones do not.
     for message in std::iter::from_fn(|| messages.try_next()).take(WAITING) {
         if enough(&counts) {
             break;

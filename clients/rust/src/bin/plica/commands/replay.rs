@@ -1,8 +1,8 @@
-//! `replay`: the poses of a recording, byte by byte, at their times.
+//! `replay`: publishes the poses of a recording, byte by byte, at their recorded times.
 //!
 //! `source_id`, `sequence` and `source_time_ns` stay as recorded, so that recording a replay gives the same bytes. A
-//! daemon that has taken these very poses a moment ago refuses them as repeated until their tool is stale or it is
-//! reset; `--new-source` gives each replay an id of its own and changes those four bytes only.
+//! daemon that has just accepted the same poses refuses them as repeated until their tool is stale or the daemon is reset;
+//! `--new-source` gives each replay an id of its own and changes those four bytes only.
 
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
@@ -16,7 +16,7 @@ use super::Stop;
 use crate::args::Replay;
 use crate::output::{Output, progress};
 
-/// Where a binary pose has its `source_id`.
+/// Bytes of `source_id` in a binary pose.
 const SOURCE_ID: std::ops::Range<usize> = 24..28;
 
 pub(crate) fn run(client: &Client, replay: &Replay, output: Output) -> anyhow::Result<()> {
@@ -40,7 +40,7 @@ pub(crate) fn run(client: &Client, replay: &Replay, output: Output) -> anyhow::R
     bar.finish_and_clear();
     let seconds = start.elapsed().as_secs_f64();
     if new_source.is_none() {
-        output.note("a daemon that has seen these poses counts them as repeated; --new-source plays them as new ones");
+        output.note("a daemon that has received these poses before refuses them as repeated; --new-source publishes them as new ones");
     }
     let value = json!({"file": replay.file, "poses": published, "tools": publishers.len(), "seconds": seconds});
     let text = format!("{published} poses of {} tool(s) in {seconds:.1} s", publishers.len());
@@ -53,12 +53,12 @@ fn poses(replay: &Replay) -> anyhow::Result<Vec<Recorded>> {
     let poses: Vec<Recorded> =
         read(&replay.file)?.filter(|message| message.as_ref().map_or(true, is_pose)).collect::<Result<_, _>>()?;
     if poses.is_empty() {
-        bail!("{}: no poses in it; was anybody publishing while it was recorded?", replay.file.display());
+        bail!("{}: no poses; was a tracker publishing during the recording?", replay.file.display());
     }
     Ok(poses)
 }
 
-/// One publisher per recorded key, under the session that is connected now.
+/// One publisher per recorded key, in the session of this connection.
 fn publishers(client: &Client, poses: &[Recorded]) -> anyhow::Result<HashMap<String, PosePublisher>> {
     let mut publishers = HashMap::new();
     for pose in poses {

@@ -1,4 +1,4 @@
-//! `jobs fetch`: a result, whole and checked, or not at all.
+//! `jobs fetch`: downloads a result; the file appears only when it is complete and checked.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
@@ -26,7 +26,7 @@ pub(super) fn run(client: &Client, fetch: &Fetch, output: Output) -> anyhow::Res
         Ok(header)
     });
     if fetched.is_err() {
-        // What is half there helps nobody.
+        // An incomplete download is of no use.
         let _ = fs::remove_file(&part);
     }
     let ChunkHeader { total_bytes, sha256, .. } = fetched?;

@@ -16,7 +16,7 @@ pub(super) fn run(client: &Client, output: Output) -> anyhow::Result<ExitCode> {
 
 fn table(reply: &JobListReply) -> String {
     if reply.jobs.is_empty() {
-        return "no jobs; `plica jobs submit` makes one".to_owned();
+        return "no jobs; `plica jobs submit` queues one".to_owned();
     }
     let mut lines = vec![line(["job", "state", "kind", "scene", "examples"], "")];
     lines.extend(reply.jobs.iter().map(describe));
@@ -34,7 +34,7 @@ fn line([id, state, kind, scene, examples]: [&str; 5], rest: &str) -> String {
     format!("{id:<6} {state:<10} {kind:<11} {scene:<16} {examples:<26} {rest}").trim_end().to_owned()
 }
 
-/// How far a job is: `40 of 128, 1 rejected`.
+/// Progress of a job: `40 of 128, 1 rejected`.
 pub(super) fn examples(job: &Job) -> String {
     let p = &job.progress;
     let total =

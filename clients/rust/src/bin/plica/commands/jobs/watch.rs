@@ -1,4 +1,4 @@
-//! `jobs watch`: a bar until a job is over.
+//! `jobs watch`: progress of a job until it ends.
 
 use std::io::{IsTerminal, stderr};
 use std::process::ExitCode;
@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use indicatif::{HumanDuration, ProgressBar};
-use plica_client::protocol::jobs::{Job, JobProgress, JobState};
+use plica_client::protocol::jobs::{Job, JobProgressMessage, JobState};
 use plica_client::{Client, ClientError};
 use serde_json::json;
 
@@ -14,14 +14,14 @@ use super::list::examples;
 use crate::commands::Stop;
 use crate::output::{Output, progress};
 
-/// Messages of all jobs that may wait.
+/// Most waiting messages, of all jobs.
 const WAITING: usize = 64;
 const LOOK: Duration = Duration::from_millis(100);
-/// How often the daemon is asked besides: what is published may be lost.
+/// Interval between queries of the job, since published messages may be lost.
 const ASK: Duration = Duration::from_secs(2);
-/// How long a daemon may be away, being restarted for instance.
+/// Longest absence of a daemon, for instance while it restarts.
 const PATIENCE: Duration = Duration::from_secs(60);
-/// What a shell reports for Ctrl-C.
+/// Exit code of a shell for Ctrl-C.
 const INTERRUPTED: u8 = 130;
 
 pub(super) fn run(client: &Client, id: Option<&str>, output: Output) -> anyhow::Result<ExitCode> {
@@ -31,7 +31,7 @@ pub(super) fn run(client: &Client, id: Option<&str>, output: Output) -> anyhow::
     let mut asked = Instant::now();
     while !watched.job.state.is_over() && !stop.is_set() {
         if let Some(message) = messages.next(LOOK) {
-            watched.hear(message);
+            watched.update(message);
         }
         if asked.elapsed() >= ASK || watched.job.state.is_over() {
             watched.learn(client.job(&watched.job.id))?;
@@ -42,44 +42,44 @@ pub(super) fn run(client: &Client, id: Option<&str>, output: Output) -> anyhow::
     end(&watched.job, output)
 }
 
-/// The wanted job, or the first that is not over.
+/// The job with the given id, or the oldest that has not ended.
 fn first(client: &Client, id: Option<&str>) -> anyhow::Result<Job> {
     if let Some(id) = id {
         return Ok(client.job(id)?);
     }
     let unfinished = client.jobs()?.jobs.into_iter().find(|job| !job.state.is_over());
-    unfinished.context("no job waits or runs; name one of `plica jobs list`")
+    unfinished.context("no job is queued or running; name one of `plica jobs list`")
 }
 
-/// The job as far as it is known, and the bar that shows it.
+/// Last known state of the job, and its progress bar.
 struct Watched {
     job: Job,
     bar: ProgressBar,
     output: Output,
-    /// Since when the daemon has not answered.
+    /// Time since which the daemon has not answered.
     lost: Option<Instant>,
-    /// The state that has been told where there is no bar.
-    told: Option<JobState>,
+    /// Last state printed where there is no bar.
+    printed: Option<JobState>,
 }
 
 impl Watched {
     fn new(job: Job, output: Output) -> Self {
         let bar = progress(Some(u64::from(job.progress.total.max(1))), "examples");
-        let mut watched = Self { job, bar, output, lost: None, told: None };
+        let mut watched = Self { job, bar, output, lost: None, printed: None };
         watched.show();
         watched
     }
 
-    fn hear(&mut self, message: JobProgress) {
+    fn update(&mut self, message: JobProgressMessage) {
         if message.id != self.job.id {
             return;
         }
-        let JobProgress { state, reason, progress, .. } = message;
+        let JobProgressMessage { state, reason, progress, .. } = message;
         self.job = Job { state, reason, progress, ..self.job.clone() };
         self.show();
     }
 
-    /// A daemon that is away may come back: jobs outlive it. What it refuses is final.
+    /// Tolerates a daemon that does not answer, since jobs continue after its restart. A refusal is final.
     fn learn(&mut self, answer: Result<Job, ClientError>) -> anyhow::Result<()> {
         match answer {
             Ok(job) => {
@@ -91,7 +91,7 @@ impl Watched {
                 let id = &self.job.id;
                 let since = *self.lost.get_or_insert_with(Instant::now);
                 if since.elapsed() >= PATIENCE {
-                    let advice = format!("the daemon is gone; job {id} goes on when it is started again");
+                    let advice = format!("the daemon has stopped; job {id} continues when it is started again");
                     return Err(anyhow::Error::new(error).context(advice));
                 }
                 self.bar.set_message("the daemon does not answer; waiting for it");
@@ -108,8 +108,8 @@ impl Watched {
         let left = left.map_or_else(String::new, |left| format!(", {} left", HumanDuration(left)));
         let rejected = if p.rejected == 0 { String::new() } else { format!(", {} rejected", p.rejected) };
         self.bar.set_message(format!("{}{rejected}{left}", self.job.state.name()));
-        if !stderr().is_terminal() && self.told != Some(self.job.state) {
-            self.told = Some(self.job.state);
+        if !stderr().is_terminal() && self.printed != Some(self.job.state) {
+            self.printed = Some(self.job.state);
             self.output.note(&format!("job {} is {}", self.job.id, self.job.state.name()));
         }
     }
@@ -125,10 +125,13 @@ fn end(job: &Job, output: Output) -> anyhow::Result<ExitCode> {
         }
         JobState::Failed | JobState::Cancelled => {
             let reason = job.reason.as_deref().map_or_else(String::new, |reason| format!(": {reason}"));
-            bail!("job {id} is {}{reason}; `plica jobs resume {id}` goes on with what is finished", job.state.name())
+            bail!(
+                "job {id} is {}{reason}; `plica jobs resume {id}` continues it with its finished examples",
+                job.state.name()
+            )
         }
         JobState::Queued | JobState::Running | JobState::Paused => {
-            let text = format!("job {id} goes on without being watched; `plica jobs watch {id}` shows it again");
+            let text = format!("job {id} continues; `plica jobs watch {id}` shows it again");
             output.note(&text);
             output.result(&json!(job), &format!("job {id} is {}: {}", job.state.name(), examples(job)));
             Ok(ExitCode::from(INTERRUPTED))

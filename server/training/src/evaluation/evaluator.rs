@@ -1,4 +1,4 @@
-//! Held-out states that ways to enrich are judged by.
+//! Evaluates enrichment methods on held-out states.
 
 use nalgebra::Point3;
 use plica_geometry::ReferenceSkin;
@@ -6,21 +6,21 @@ use plica_sim::enrichment::{Enricher, EnricherError, Examples, Touch};
 use plica_sim::{Model, ModelError};
 
 use super::measure::Patch;
+use super::method_evaluation::{EvaluatedMethod, EvaluatedState, MethodEvaluation};
 use super::methods::Method;
 use super::prepared::{Outcome, Prepared};
-use super::verdict::{Judged, Verdict};
 use crate::database::Database;
 use crate::obstacle::radius_m;
 use crate::setup::{IN_REGION, Setup};
 
 /// Name of the skin without enrichment.
 pub const COARSE: &str = "coarse";
-/// States that the coarse skin misses by less are left out \[m\].
+/// Least RMS of the detail; states below it are left out \[m\].
 const LEAST_DETAIL_M: f64 = 2e-5;
-/// What is near the contact, in radii of the tool.
+/// Radius of the skin near the contact, in tool radii.
 const NEAR_RADII: f64 = 3.0;
 
-/// Why nothing can be judged.
+/// Why nothing can be evaluated.
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluationError {
     /// The coarse model cannot be built.
@@ -46,10 +46,10 @@ pub enum EvaluationError {
         /// The scene's.
         expected: usize,
     },
-    /// The observer broke off.
+    /// Ended by the observer.
     #[error("interrupted")]
     Interrupted,
-    /// There is nothing to judge by.
+    /// No held-out example can be used.
     #[error(
         "none of {n} held-out examples lies in the trained region and has detail of {least_mm} mm or more",
         least_mm = 1e3 * LEAST_DETAIL_M
@@ -60,8 +60,8 @@ pub enum EvaluationError {
     },
 }
 
-/// Held-out states, and the examples to learn from.
-pub struct Judge {
+/// Held-out states, and the examples that methods are trained on.
+pub struct Evaluator {
     model: Model,
     whole: Patch,
     states: Vec<HeldOut>,
@@ -78,8 +78,8 @@ struct HeldOut {
     independent: Option<Vec<[f32; 3]>>,
 }
 
-impl Judge {
-    /// Takes in both databases of a scene.
+impl Evaluator {
+    /// Prepares the states of `held_out` and the examples of `training`.
     ///
     /// # Errors
     /// See [`EvaluationError`].
@@ -117,23 +117,23 @@ impl Judge {
         Ok(Self { model, whole, left_out: n - states.len(), states, examples: training.leading_examples(usize::MAX) })
     }
 
-    /// States that are judged: in the region, and outside of it.
+    /// Numbers of states in the trained region and outside of it.
     pub fn n_states(&self) -> [usize; 2] {
         let inside = self.states.iter().filter(|s| s.kind == IN_REGION).count();
         [inside, self.states.len() - inside]
     }
 
-    /// States that the coarse skin hardly misses.
+    /// Held-out examples left out, because their detail is below the threshold.
     pub fn n_left_out(&self) -> usize {
         self.left_out
     }
 
-    /// Examples to learn from.
+    /// Number of training examples.
     pub fn n_examples(&self) -> usize {
         self.examples.touches.len()
     }
 
-    /// The first `n` examples to learn from.
+    /// The first `n` training examples.
     pub(super) fn examples(&self, n: usize) -> Examples {
         let n = n.min(self.n_examples());
         Examples {
@@ -143,7 +143,7 @@ impl Judge {
         }
     }
 
-    /// A way to enrich with what it needs to be run.
+    /// Builds the enricher of a method and its scratch memory.
     pub(super) fn prepare(&self, method: &Method, examples: &Examples) -> Result<Prepared<'_>, EvaluationError> {
         let failed = |source| EvaluationError::Method { method: method.name.clone(), source };
         let enricher = Enricher::new(&self.model, examples, method.options).map_err(failed)?;
@@ -160,48 +160,59 @@ impl Judge {
         self.whole.largest(detail, None)
     }
 
-    /// `E` of `detail` against `tied`; `None` where the coarse skin misses next to nothing.
+    /// `E` of `detail` against `tied`; `None` where `tied` is below the threshold.
     pub(super) fn ratio(&self, detail: &[[f32; 3]], tied: &[[f32; 3]]) -> Option<f64> {
         let own = self.rms(tied);
         (own >= LEAST_DETAIL_M).then(|| self.whole.rms(detail, Some(tied)) / own)
     }
 
-    /// What `method` makes of all states, taught by the first `n_examples` examples.
+    /// Evaluates `method`, trained on the first `n_examples` examples, on all states.
     ///
     /// # Errors
     /// [`EvaluationError::Method`].
-    pub fn judge(&self, method: &Method, n_examples: usize) -> Result<Verdict, EvaluationError> {
-        self.judge_with(method, &self.examples(n_examples))
+    pub fn evaluate(&self, method: &Method, n_examples: usize) -> Result<MethodEvaluation, EvaluationError> {
+        self.evaluate_with(method, &self.examples(n_examples))
     }
 
-    pub(super) fn judge_with(&self, method: &Method, examples: &Examples) -> Result<Verdict, EvaluationError> {
+    pub(super) fn evaluate_with(
+        &self,
+        method: &Method,
+        examples: &Examples,
+    ) -> Result<MethodEvaluation, EvaluationError> {
         let mut prepared = self.prepare(method, examples)?;
-        let judged = self.run(|s| prepared.evaluate_timed(&s.displacements, &s.touch));
-        let named = (method.name.as_str(), method.correlator(), method.interpolator());
+        let states = self.run(|s| prepared.evaluate_timed(&s.displacements, &s.touch));
+        let evaluated = EvaluatedMethod {
+            name: &method.name,
+            correlator: method.correlator(),
+            interpolator: method.interpolator(),
+            n_examples: examples.touches.len(),
+            table_bytes: prepared.table_bytes(),
+        };
         let nothing = || EvaluationError::NothingInRegion { n: self.states.len() };
-        let taught = (examples.touches.len(), prepared.table_bytes());
-        Verdict::of(named, taught, &judged).ok_or_else(nothing)
+        MethodEvaluation::of(&evaluated, &states).ok_or_else(nothing)
     }
 
-    /// What the skin is without enrichment: `E` is 1, but the millimetres tell.
+    /// The skin without enrichment: `E` is 1, the errors in millimetres are those of the coarse model.
     ///
     /// # Errors
     /// [`EvaluationError::NothingInRegion`].
-    pub fn coarse(&self) -> Result<Verdict, EvaluationError> {
+    pub fn coarse(&self) -> Result<MethodEvaluation, EvaluationError> {
         let nothing = vec![[0.0; 3]; self.model.n_skin()];
-        let judged = self.run(|_| Outcome { detail: nothing.clone(), confidence: 0.0, time_us: 0.0 });
+        let states = self.run(|_| Outcome { detail: nothing.clone(), confidence: 0.0, time_us: 0.0 });
         let no_state = || EvaluationError::NothingInRegion { n: self.states.len() };
-        Verdict::of((COARSE, "none", "none"), (0, 0), &judged).ok_or_else(no_state)
+        let evaluated =
+            EvaluatedMethod { name: COARSE, correlator: "none", interpolator: "none", n_examples: 0, table_bytes: 0 };
+        MethodEvaluation::of(&evaluated, &states).ok_or_else(no_state)
     }
 
-    fn run(&self, mut outcome: impl FnMut(&HeldOut) -> Outcome) -> Vec<Judged<'_>> {
-        let judge = |state| {
+    fn run(&self, mut outcome: impl FnMut(&HeldOut) -> Outcome) -> Vec<EvaluatedState<'_>> {
+        let evaluate = |state| {
             let Outcome { detail, confidence, time_us } = outcome(state);
             let independent = state.independent.as_deref();
             let whole = self.whole.measure(&detail, &state.tied, independent)?;
             let near = state.near.measure(&detail, &state.tied, independent);
-            Some(Judged { kind: &state.kind, whole, near, confidence, time_us })
+            Some(EvaluatedState { kind: &state.kind, whole, near, confidence, time_us })
         };
-        self.states.iter().filter_map(judge).collect()
+        self.states.iter().filter_map(evaluate).collect()
     }
 }
