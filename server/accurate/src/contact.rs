@@ -6,7 +6,6 @@
 mod follow;
 mod friction;
 mod increment;
-mod increments;
 mod normal;
 mod obstacle;
 mod params;
@@ -14,6 +13,7 @@ mod press;
 mod report;
 mod result;
 mod state;
+mod step_size;
 mod surface;
 
 pub use friction::{Friction, FrictionRow};

@@ -5,11 +5,11 @@ use std::ops::ControlFlow;
 use nalgebra::{Isometry3, Vector3};
 
 use super::increment::{Failure, Fit, Increment};
-use super::increments::Increments;
 use super::press::Press;
 use super::report::report;
 use super::result::{ContactError, ContactInfo, ContactProgress};
 use super::state::ContactState;
+use super::step_size::Increments;
 use crate::newton::{Progress, Solver};
 
 impl Press<'_> {
