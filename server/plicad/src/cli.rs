@@ -27,6 +27,8 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Runs a scene in real time and serves it on the bus until Ctrl-C.
+    ///
+    /// Ends with code 0 after SIGINT or SIGTERM, 1 after an error, 76 if the bus has gone deaf: start it again then, as deploy/plicad.service does.
     Serve(ServeArgs),
     /// Trains a few examples, serves on loopback, drives the tool through a real client, prints a summary, writes pictures.
     Demo(DemoArgs),
