@@ -12,6 +12,7 @@ pub mod chunk;
 mod error;
 pub mod jobs;
 pub mod keys;
+mod object;
 pub mod order;
 pub mod pose;
 pub mod rpc;

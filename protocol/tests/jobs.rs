@@ -105,16 +105,24 @@ fn requests_of_another_shape_are_malformed() {
         r#"{"client_id": "a", "kind": "training", "examples": 1.5}"#,
         r#"{"client_id": "a", "kind": "training", "seed": 18446744073709551616}"#,
         r#"{"client_id": 7, "kind": "training"}"#,
+        r#"{"client_id": "a", "kind": {"training": null}}"#,
+        r#"["a", "training"]"#,
         r#"{"client_id": "a", "kind": "training", "scene": ["x"]}"#,
     ];
     for text in bad {
         let error = decode_request::<JobSubmitRequest>(text.as_bytes()).unwrap_err();
         assert_eq!((error.code.as_str(), error.retryable), ("rpc_malformed", false), "{text}");
     }
-    for text in ["{}", r#"{"id": 3}"#, r#"{"id": "3", "force": true}"#] {
+    for text in ["{}", r#"{"id": 3}"#, r#"{"id": "3", "force": true}"#, r#"["3"]"#] {
         assert_eq!(decode_request::<JobRequest>(text.as_bytes()).unwrap_err().code, "rpc_malformed", "{text}");
     }
-    for text in [r#"{"id": "3"}"#, r#"{"id": "3", "what": "log"}"#, r#"{"id": "3", "what": "../x"}"#] {
+    for text in [
+        r#"{"id": "3"}"#,
+        r#"{"id": "3", "what": "log"}"#,
+        r#"{"id": "3", "what": "../x"}"#,
+        r#"["3", "report"]"#,
+        r#"{"id": "3", "what": {"report": null}}"#,
+    ] {
         assert_eq!(decode_request::<JobFetchRequest>(text.as_bytes()).unwrap_err().code, "rpc_malformed", "{text}");
     }
 }

@@ -81,6 +81,8 @@ impl JobError {
 
 impl From<JobError> for ErrorReply {
     fn from(error: JobError) -> Self {
-        Self::new(error.code(), error.to_string())
+        let passes = matches!(error, JobError::Disk(_));
+        let reply = Self::new(error.code(), error.to_string());
+        if passes { reply.nothing_done_yet() } else { reply }
     }
 }

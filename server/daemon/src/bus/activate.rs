@@ -58,7 +58,9 @@ impl Worker {
         let activation = Box::new(Activation { query, live, n_examples });
         if let Err(error) = self.orders.try_send(Request::Activate(activation)) {
             let busy = ErrorReply::new(ErrorCode::Busy, "too many requests are waiting");
-            self.replies.send(refused(error).into_query(), Err(busy));
+            if let Some(query) = refused(error).into_query() {
+                self.replies.send(query, Err(busy));
+            }
         }
     }
 

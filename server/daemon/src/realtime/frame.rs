@@ -59,6 +59,8 @@ pub struct Reading {
     pub fallbacks: u64,
     /// Contact rows since reset that were found and left out because a tool or plane had its `max_contacts`.
     pub dropped_contacts: u64,
+    /// Counts activations of examples; 0: none is active.
+    pub database_generation: u32,
     /// Least confidence over the tools in contact; `None` while no examples are active.
     pub confidence: Option<f32>,
     /// All tools, `[n_tools]`.

@@ -175,6 +175,7 @@ impl Outbox {
         reading.max_penetration_m = self.max_penetration_m;
         reading.fallbacks = self.fallbacks;
         reading.dropped_contacts = self.dropped_contacts;
+        reading.database_generation = detail.generation();
         reading.confidence = detail.least_confidence();
         reading.tools.copy_from_slice(state.tools());
         self.readings.publish();
