@@ -199,3 +199,21 @@ fn the_page_names_every_counter_and_every_code() {
         assert!(page.lines().any(in_a_table), "no table of PROTOCOL.md has `{name}`");
     }
 }
+
+#[test]
+fn the_page_names_the_limits() {
+    let page = include_str!("../PROTOCOL.md");
+    let limits = page.split("**Limits.**").nth(1).unwrap().split("\n## ").next().unwrap();
+    let zenoh = include_str!("../../configs/zenoh/default.json5");
+    let thousands = |n: usize| if n < 1000 { n.to_string() } else { format!("{},{:03}", n / 1000, n % 1000) };
+    let ticks_and_poses = format!("| {} and {} |", thousands(MAX_STEP_TICKS as usize), thousands(MAX_STEP_POSES));
+    for row in [ticks_and_poses, format!("| {MAX_SNAPSHOTS} | snapshots"), "| 64 | clients".into(), "| 4 MiB |".into()]
+    {
+        assert!(limits.contains(&row), "{row}");
+    }
+    assert!(
+        zenoh.contains("max_sessions: 64,") && zenoh.contains("max_message_size: 4194304"),
+        "they stand on the page"
+    );
+    assert!(page.contains(&format!("stops early after {} s", ANSWER_WITHIN.as_secs())));
+}

@@ -108,7 +108,7 @@ def heavy(scene, folder):
     text = pathlib.Path(scene).read_text()
     assert "divisions = [8, 4, 4]" in text
     file = folder / "heavy.toml"
-    file.write_text(text.replace("divisions = [8, 4, 4]", "divisions = [40, 16, 16]"))
+    file.write_text(text.replace("divisions = [8, 4, 4]", "divisions = [32, 14, 14]"))
     return str(file)
 
 

@@ -30,7 +30,7 @@ def rows(text):
 def layout(title, n_bytes):
     """Names, and a `struct` format, of the first table of a section; the table has neither gap nor overlap."""
     names, codes, end = [], "<", 0
-    for offset, kind, name, _ in rows(section(title)):
+    for offset, kind, name, *_ in [row for row in rows(section(title)) if len(row) == 4]:
         match = re.fullmatch(r"`(\w+)(?:\[(\d+)\])?`", kind)
         if not (offset.isdigit() and match) or end == n_bytes:
             continue
@@ -203,7 +203,7 @@ def test_a_press_over_the_streams_reads_as_the_page_says(stranger):
     n = header["n_vertices"]
     s.holds(header["magic"] == b"PLSK" and len(frame) == 64 + 12 * n and header["tick"] > 0, header)
     moved = np.frombuffer(frame, "<f4", 3 * n, 64) - np.frombuffer(rest, "<f4", 3 * n, 64)
-    s.holds(1e-3 < np.abs(moved).max() < 0.03, "the skin is pressed in")
+    s.holds(5e-4 < np.abs(moved).max() < 0.03, "the skin is pressed in")
 
     # Of several kinds the first counts: 1,024 times x is no message of ours, whatever its length.
     before = s.status()["tools"]["probe"]["poses_rejected"]
