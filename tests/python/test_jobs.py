@@ -419,6 +419,7 @@ def test_a_full_disk_is_named_and_made_room_on(plicad, small, tmp_path, undistur
         print(f"\n{failed['reason']}")
         refused = client.refused("job_submit", {"client_id": "another", "kind": "training"})
         assert refused.code == "jobs_unavailable" and "No space left on device" in refused.body["message"], refused
+        assert (refused.body["retryable"], refused.body["done"]) == (True, "no"), "a full disk passes"
         os.remove(filler)
         client.rpc("job_resume", {"id": made["id"]})
         until(client, made["id"], "done")
