@@ -14,6 +14,7 @@ mod hex_mesh;
 pub mod import;
 mod index;
 pub mod isoparametric;
+pub mod joints;
 mod locate;
 mod neighbourhood;
 pub mod predicate;
