@@ -18,7 +18,7 @@ use std::path::Path;
 use crate::hex_mesh::HexMesh;
 pub use error::{ImportError, Place};
 pub use groups::{Group, Groups};
-pub use obj::read_obj_parts;
+pub use obj::{ObjPart, read_obj_parts};
 
 use error::{Fault, fault};
 

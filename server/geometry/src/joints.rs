@@ -12,6 +12,7 @@ use nalgebra::Point3;
 
 use crate::hex_mesh::HexMesh;
 use faces::Boundary;
+pub(crate) use faces::distance_to_triangle;
 
 /// Nodes, or a node and a face, closer than this share of the shortest edge around them are at one place.
 pub(crate) const TOUCH: f64 = 1e-2;

@@ -6,6 +6,7 @@
 mod box_tree;
 mod clusters;
 mod convex_polytope;
+mod convexity;
 mod display_surface;
 mod embedding;
 mod exponential_map;
@@ -25,6 +26,7 @@ mod skin;
 
 pub use clusters::CLUSTER_SIZE;
 pub use convex_polytope::{ConvexPolytope, FaceDistance, FacePlane, HullError};
+pub use convexity::hull_stand_off;
 pub use display_surface::{DisplaySurface, vertex_normals_into};
 pub use embedding::{DEFAULT_SUPPORT_CELLS, Embedding, EmbeddingError, EmbeddingKind, MAX_OUTSIDE_CELLS};
 pub use exponential_map::{ExponentialMaps, Mapped};

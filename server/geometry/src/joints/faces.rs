@@ -127,7 +127,8 @@ impl<'a> Boundary<'a> {
     fn is_overlapped(&self, number: usize, quad: &Quad, is_matched: &[bool]) -> bool {
         let [lower, upper] = quad.bounds();
         let mut is_overlapped = false;
-        self.grid.near(0.0, &lower, &upper, |other| {
+        // Of two faces the smaller one asks.
+        self.grid.near((upper - lower).amax(), &lower, &upper, |other| {
             let (other, face) = (other as usize, &self.quads[other as usize]);
             if !is_overlapped && other != number && is_matched[other] && quad.normal.dot(&face.normal) < OPPOSED {
                 is_overlapped = quad.overlaps(face);

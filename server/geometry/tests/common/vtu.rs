@@ -4,10 +4,10 @@ use std::fmt::Write;
 
 /// A box of hexahedra with nodes of its own.
 #[derive(Clone, Copy, Debug)]
-pub struct Bar {
-    pub lower: [f64; 3],
-    pub upper: [f64; 3],
-    pub divisions: [usize; 3],
+pub(crate) struct Bar {
+    pub(crate) lower: [f64; 3],
+    pub(crate) upper: [f64; 3],
+    pub(crate) divisions: [usize; 3],
 }
 
 impl Bar {
@@ -33,12 +33,12 @@ impl Bar {
 }
 
 /// One piece that holds all bars.
-pub fn vtu(bars: &[Bar]) -> String {
+pub(crate) fn vtu(bars: &[Bar]) -> String {
     file(&piece(bars, 12, ""))
 }
 
 /// `<VTKFile>` around pieces.
-pub fn file(pieces: &str) -> String {
+pub(crate) fn file(pieces: &str) -> String {
     format!(
         "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\">\n<UnstructuredGrid>\n{pieces}\
          </UnstructuredGrid>\n</VTKFile>\n"
@@ -46,7 +46,7 @@ pub fn file(pieces: &str) -> String {
 }
 
 /// A piece of bars as cells of type `code`; `data` stands behind the cells.
-pub fn piece(bars: &[Bar], code: u32, data: &str) -> String {
+pub(crate) fn piece(bars: &[Bar], code: u32, data: &str) -> String {
     let (mut points, mut cells) = (Vec::new(), Vec::new());
     for bar in bars {
         let first = points.len();

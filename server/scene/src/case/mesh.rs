@@ -29,6 +29,14 @@ pub enum MeshSource {
 }
 
 impl MeshSource {
+    /// The key that sets the size of the mesh, and whether it is the unit of a file.
+    pub(super) fn size_key(&self) -> (&'static str, bool) {
+        match self {
+            Self::Generated(_) => ("mesh", false),
+            Self::File { .. } => ("mesh.metres_per_unit", true),
+        }
+    }
+
     /// Generates or reads the mesh.
     pub(super) fn load(&self, document: &Document) -> Result<NamedMesh, ConfigError> {
         match self {
