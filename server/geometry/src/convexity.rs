@@ -4,9 +4,9 @@ use nalgebra::{Point3, Vector3};
 
 use crate::box_tree::{Aabb, BoxTree};
 use crate::convex_polytope::ConvexPolytope;
-use crate::joints::distance_to_triangle;
+use crate::triangle::distance_to_triangle;
 
-/// The hull is looked at every so many parts of its extent.
+/// Samples of the hull along its extent.
 const FINENESS: f64 = 24.0;
 
 /// Largest distance from the surface of `hull` to the nearest of `triangles`, which index `points` \[m\]: 0 for a convex surface

@@ -9,46 +9,21 @@ mod error;
 mod groups;
 mod merge;
 mod msh;
+mod named_mesh;
 mod obj;
+mod options;
 mod text;
 mod vtu;
 
 use std::path::Path;
 
-use crate::hex_mesh::HexMesh;
 pub use error::{ImportError, Place};
 pub use groups::{Group, Groups};
+pub use named_mesh::NamedMesh;
 pub use obj::{ObjPart, read_obj_parts};
+pub use options::ReadOptions;
 
 use error::{Fault, fault};
-
-/// Mesh with the named groups of its file.
-#[derive(Clone, Debug)]
-pub struct NamedMesh {
-    /// Nodes \[m\] and hexahedra, in the order of the file; nodes that no hexahedron uses are left out.
-    pub mesh: HexMesh,
-    /// Named parts.
-    pub groups: Groups,
-    /// Sentences about the mesh that its user should read: nodes that were merged, parts that are not joined.
-    pub remarks: Vec<String>,
-}
-
-/// How a mesh file is to be read.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ReadOptions {
-    /// Length of the file's unit \[m\].
-    pub metres_per_unit: f64,
-    /// Nodes closer than this become one \[m\]. Without it none do, and parts that touch without sharing nodes are an error; with
-    /// 0 none do, and such parts are a remark.
-    pub merge_tolerance_m: Option<f64>,
-}
-
-impl ReadOptions {
-    /// A file in this unit \[m\] whose parts share their nodes.
-    pub fn unit(metres_per_unit: f64) -> Self {
-        Self { metres_per_unit, merge_tolerance_m: None }
-    }
-}
 
 /// Reads a `.vtu` or `.msh` file of 8-node hexahedra.
 ///

@@ -12,12 +12,6 @@ use nalgebra::Point3;
 
 use crate::hex_mesh::HexMesh;
 use faces::Boundary;
-pub(crate) use faces::distance_to_triangle;
-
-/// Nodes, or a node and a face, closer than this share of the shortest edge around them are at one place.
-pub(crate) const TOUCH: f64 = 1e-2;
-/// Faces that look at each other across less than this share of the shortest edge are told.
-const NEAR: f64 = 0.1;
 
 /// Points of a mesh of one kind of trouble.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,7 +52,7 @@ pub struct Joints {
 impl Joints {
     /// Looks through a mesh; time and memory grow with the number of hexahedra, not with its square.
     ///
-    /// Nodes at one point are told, and count as one for everything else.
+    /// Nodes at one point are reported, and count as one for everything else.
     pub fn find(mesh: &HexMesh) -> Self {
         let sizes = shortest_edges(mesh);
         let twins = grid::coincident(mesh.nodes(), &sizes);

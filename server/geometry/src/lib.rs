@@ -23,6 +23,7 @@ mod reference_skin;
 pub mod select;
 pub mod shapes;
 mod skin;
+mod triangle;
 
 pub use clusters::CLUSTER_SIZE;
 pub use convex_polytope::{ConvexPolytope, FaceDistance, FacePlane, HullError};

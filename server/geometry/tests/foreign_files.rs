@@ -62,7 +62,7 @@ fn cells_that_another_piece_owns_are_left_to_it_and_groups_span_pieces() {
     let ghosts = [[0; 8].as_slice(), &[1; 4]].concat();
     let left = piece(&[LEFT, layer], 12, &cell_data("vtkGhostType", &ghosts));
     let right = piece(&[RIGHT], 12, &cell_data("vtkGhostType", &[0; 8]));
-    // The ghosts' own nodes go with them: what is left is the bar.
+    // The ghosts' own nodes go with them, and the bar is left.
     check_bar("ghosts", file(&format!("{left}{right}")).as_bytes());
     let [left, right] = [(LEFT, 1), (RIGHT, 2)].map(|(bar, material)| {
         piece(&[bar], 12, &cell_data("material", &[1, 1, 1, 1, material, material, material, material]))

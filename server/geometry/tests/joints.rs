@@ -1,4 +1,4 @@
-//! Meshes whose parts touch without sharing nodes: told with number and place, or merged.
+//! Meshes whose parts touch without sharing nodes: refused with number and place, or merged.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod common;

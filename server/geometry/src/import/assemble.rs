@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::Point3;
 
-use super::NamedMesh;
 use super::error::{DAMAGED, Fault, Place, fault};
 use super::groups::{Group, Groups};
+use super::named_mesh::NamedMesh;
 use crate::hex_mesh::{HexMesh, MeshError};
 use crate::index::{HexIdx, NodeIdx};
 use crate::isoparametric;

@@ -1,7 +1,8 @@
 //! Whether the parts of a mesh that was read are joined where they touch.
 
 use super::error::{Fault, Place, fault};
-use super::{NamedMesh, ReadOptions};
+use super::named_mesh::NamedMesh;
+use super::options::ReadOptions;
 use crate::joints::{Joints, Sites};
 
 /// Remeshing is the remedy where merging nodes joins nothing.
@@ -36,7 +37,7 @@ pub(super) fn joints(named: &mut NamedMesh, options: &ReadOptions) -> Result<(),
     Ok(())
 }
 
-/// What makes a solution that of another body, with the remedy; the first is the most telling.
+/// Faults that make a solution that of another body, with the remedy; the most telling first.
 fn wrong(joints: &Joints, options: &ReadOptions) -> Vec<(String, String)> {
     let unit = options.metres_per_unit;
     let Joints { coincident, hanging, overlapping, hinged, .. } = joints;

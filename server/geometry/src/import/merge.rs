@@ -4,9 +4,9 @@ use std::collections::HashMap;
 
 use nalgebra::Point3;
 
-use super::ReadOptions;
 use super::assemble::{Content, Shape};
 use super::error::{Fault, Place, fault};
+use super::options::ReadOptions;
 
 /// Merges points, and tells how many.
 pub(super) fn merge(content: Content, options: &ReadOptions) -> Result<(Content, Vec<String>), Fault> {

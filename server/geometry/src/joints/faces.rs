@@ -2,10 +2,12 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::grid::Grid;
-use super::{NEAR, TOUCH};
+use super::grid::{Grid, TOUCH};
 use crate::hex_mesh::{HEX_FACES, HexMesh};
+use crate::triangle::distance_to_triangle;
 
+/// Faces that look at each other across less than this share of the shortest edge are reported.
+const NEAR: f64 = 0.1;
 /// Faces look at each other when the cosine between their normals is below this.
 const OPPOSED: f64 = -0.9;
 /// A node looks at a face when the cosine between the normals is below this.
@@ -57,7 +59,7 @@ struct Quad {
     size: f64,
 }
 
-/// Nodes and faces that touch what they are not joined to.
+/// Nodes and faces that touch others without being joined to them.
 #[derive(Default)]
 pub(super) struct Touching {
     pub(super) hanging: Vec<u32>,
@@ -154,7 +156,7 @@ impl Quad {
         }
     }
 
-    /// Box around it that holds what is near.
+    /// Box around the face, with a margin for everything near.
     fn bounds(&self) -> [Point3<f64>; 2] {
         let [a, rest @ ..] = self.corners;
         let lower = rest.iter().fold(a, |lower, x| lower.inf(x));
@@ -203,23 +205,4 @@ fn area(polygon: &[Point3<f64>]) -> f64 {
     let Some((first, rest)) = polygon.split_first() else { return 0.0 };
     let doubled: Vector3<f64> = rest.windows(2).map(|pair| (pair[0] - first).cross(&(pair[1] - first))).sum();
     0.5 * doubled.norm()
-}
-
-/// Distance to a triangle: to its plane where the foot lies inside, else to its nearest edge \[m\].
-pub(crate) fn distance_to_triangle(x: &Point3<f64>, corners: &[Point3<f64>; 3]) -> f64 {
-    let [a, b, c] = corners;
-    let across = (b - a).cross(&(c - a));
-    let edges = [[a, b], [b, c], [c, a]];
-    let is_inside = edges.iter().all(|[p, q]| across.cross(&(*q - *p)).dot(&(x - *p)) >= 0.0);
-    match across.try_normalize(0.0) {
-        Some(normal) if is_inside => normal.dot(&(x - a)).abs(),
-        _ => edges.iter().map(|[p, q]| distance_to_segment(x, p, q)).fold(f64::INFINITY, f64::min),
-    }
-}
-
-fn distance_to_segment(x: &Point3<f64>, p: &Point3<f64>, q: &Point3<f64>) -> f64 {
-    let along = q - p;
-    let squared = along.norm_squared();
-    let t = if squared > 0.0 { ((x - p).dot(&along) / squared).clamp(0.0, 1.0) } else { 0.0 };
-    (x - (p + along * t)).norm()
 }

@@ -4,7 +4,8 @@ use std::collections::{BTreeSet, HashMap};
 
 use nalgebra::Point3;
 
-use super::TOUCH;
+/// Nodes, or a node and a face, closer than this share of the shortest edge around them are at one place.
+pub(super) const TOUCH: f64 = 1e-2;
 
 /// Power of two of a grid, and the cube in it.
 type Cube = (i32, [i64; 3]);
