@@ -21,11 +21,11 @@ const HASH_VERSION: u32 = 1;
 
 /// A file that belongs to the scene cannot be read.
 #[derive(Debug, thiserror::Error)]
-#[error("{key}: {path} cannot be read: {source}", path = path.display())]
+#[error("{key}: {path} cannot be read: {cause}", path = path.display())]
 pub struct HashError {
     key: String,
     path: PathBuf,
-    source: std::io::Error,
+    cause: std::io::Error,
 }
 
 /// Scene hash, 64 hexadecimal digits.
@@ -114,7 +114,7 @@ fn tool(config: &Config, tool: &ToolDescription) -> Result<Value, HashError> {
 fn mesh_file(config: &Config, tool: &str) -> Result<Value, HashError> {
     let key = format!("tools.{tool}.shape.mesh.file");
     let Some(file) = config.files().iter().find(|f| f.key == key) else { return Ok(Value::Null) };
-    let bytes = std::fs::read(&file.path).map_err(|source| HashError { key, path: file.path.clone(), source })?;
+    let bytes = std::fs::read(&file.path).map_err(|cause| HashError { key, path: file.path.clone(), cause })?;
     let digits = plica_training::hexadecimal(&Sha256::digest(bytes));
     Ok(json!({ "mesh_sha256": digits, "metres_per_unit": file.metres_per_unit }))
 }

@@ -10,6 +10,7 @@ mod error;
 mod ranges;
 
 pub mod case;
+pub mod extents;
 pub mod hash;
 pub mod model;
 pub mod motion;

@@ -30,6 +30,7 @@ pub use training::{OutsideConfig, RecordedConfig, TrainingConfig};
 use crate::checks::Check;
 use crate::document::Document;
 use crate::error::ConfigError;
+use crate::extents::{self, Size};
 use crate::ranges;
 
 /// Text of the built-in scene, the wedge.
@@ -49,6 +50,7 @@ pub struct Config {
     enrichment: EnrichmentConfig,
     files: Vec<SceneFile>,
     text: String,
+    remarks: Vec<String>,
 }
 
 /// JSON Schema of scene files: every key with its meaning, unit and range.
@@ -82,7 +84,12 @@ impl Config {
         ranges::check(&document, schema().as_value())?;
         let check = Check::new(&document);
         let object = object::check(&check, &raw.objects)?;
-        let tools = tool::check(&check, &raw.tools)?;
+        let mut remarks = Vec::new();
+        let (name, size_m) = (object.name(), object.mesh().extents_m());
+        if let Size::Doubtful(doubt) = extents::judge("the object", &format!("objects.{name}.mesh"), size_m) {
+            remarks.push(doubt);
+        }
+        let tools = tool::check(&check, &raw.tools, &mut remarks)?;
         let bench = raw.bench.as_ref().map(|b| bench::check(&check, b, &tools)).transpose()?;
         let training = check_training(&check, &raw, &tools)?;
         Ok(Self {
@@ -97,7 +104,13 @@ impl Config {
             text: text.to_owned(),
             tools,
             bench,
+            remarks,
         })
+    }
+
+    /// Sentences about the scene that its user should read: tools that are not convex, extents that are hardly meant.
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
     }
 
     /// Name of the scene: the file's name without its ending.

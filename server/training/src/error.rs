@@ -38,7 +38,7 @@ pub enum PlanError {
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
     /// The coarse model.
-    #[error("coarse model: {0}")]
+    #[error("coarse model")]
     Coarse(#[from] ModelError),
     /// The accurate model.
     #[error("accurate model")]

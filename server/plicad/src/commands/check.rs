@@ -1,7 +1,10 @@
 //! `plicad check`.
 
+mod press;
+
 use plica_daemon::limits::{check_frame, frame_bytes};
 use plica_scene::Config;
+use plica_scene::extents;
 use plica_scene::model;
 use serde::Serialize;
 
@@ -34,7 +37,9 @@ struct Report {
     skin_bytes_per_s: f64,
     wrench_bytes_per_s: f64,
     estimated_tick_us: f64,
-    estimate: &'static str,
+    estimate: String,
+    extents_m: [f64; 3],
+    warnings: Vec<String>,
     budget_us: f64,
 }
 
@@ -63,6 +68,13 @@ fn check(config: &Config) -> anyhow::Result<Report> {
             (1e6 * TYPICAL_RATIO * limit_s, "from bytes and operations; a [bench] table gives a better one")
         }
     };
+    let (estimated_tick_us, estimate) = match press::slowest(config, &model)? {
+        Some(press) if press.tick_us > estimated_tick_us => (
+            press.tick_us,
+            format!("median of a trial that presses `{}`, the slowest tool, into the object", press.tool),
+        ),
+        _ => (estimated_tick_us, estimate.to_owned()),
+    };
     Ok(Report {
         scene: config.name().to_owned(),
         object: config.object().name().to_owned(),
@@ -80,6 +92,8 @@ fn check(config: &Config) -> anyhow::Result<Report> {
         wrench_bytes_per_s: plica_protocol::wrench::BYTES as f64 * publish.wrench_hz * config.tools().len() as f64,
         estimated_tick_us,
         estimate,
+        extents_m: config.object().mesh().extents_m(),
+        warnings: config.remarks().to_vec(),
         budget_us: 1e6 * config.runtime().timestep_s(),
     })
 }
@@ -88,6 +102,7 @@ fn print(r: &Report) {
     let tools = if r.tools.is_empty() { "none".into() } else { r.tools.join(", ") };
     let solver = if r.block_tridiagonal { "block tridiagonal" } else { "block Jacobi" };
     println!("scene      {} with object `{}`, tools: {tools}", r.scene, r.object);
+    println!("extents    {}", extents::in_mm(r.extents_m));
     println!(
         "coarse     {} hexahedra, {} nodes, {} of them free; preconditioner: {solver}",
         r.n_hexes, r.n_nodes, r.n_free_nodes
@@ -102,7 +117,8 @@ fn print(r: &Report) {
     println!("tick       about {:.0} of {:.0} us ({})", r.estimated_tick_us, r.budget_us, r.estimate);
     if r.estimated_tick_us > 0.8 * r.budget_us {
         println!(
-            "           too slow for this machine: use fewer divisions, fewer substeps, or a longer runtime.timestep_s"
+            "           too slow for this machine: use fewer divisions, fewer substeps, a longer runtime.timestep_s, or a \
+             coarser skin or simpler tool where contact is the slow part"
         );
     }
 }
