@@ -160,7 +160,7 @@ pub struct JobFetchRequest {
 /// A job with its status and progress. Reply of `job_get`, `job_cancel` and `job_resume`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Job {
-    /// Id from the daemon; ids sort in the order of submission.
+    /// Id from the daemon: a number of four digits or more. Later jobs have larger numbers; as text, `10000` is before `9999`.
     pub id: String,
     /// Id from the client.
     pub client_id: String,
@@ -223,6 +223,9 @@ pub struct JobListReply {
     /// Number of older jobs that the list leaves out; `job_get` returns them by id.
     #[serde(default)]
     pub older: u32,
+    /// Number of finished jobs that the daemon has removed since its start, beyond those that it keeps.
+    #[serde(default)]
+    pub removed: u32,
 }
 
 /// Message on `job_progress`, published when a job has changed.

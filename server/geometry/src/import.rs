@@ -15,7 +15,7 @@ use std::path::Path;
 use crate::hex_mesh::HexMesh;
 pub use error::{ImportError, Place};
 pub use groups::{Group, Groups};
-pub use obj::read_obj_parts;
+pub use obj::parse_obj_parts;
 
 use error::{Fault, fault};
 

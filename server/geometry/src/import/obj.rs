@@ -1,20 +1,14 @@
 //! Convex parts of a tool from an OBJ file: every group or object is one part, taken as the hull of its vertices.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 
 use nalgebra::Point3;
 
-/// Points of each part \[m\]. A part holds the vertices of its faces.
+/// Points of each part in the text of an OBJ file \[m\]. A part holds the vertices of its faces.
 ///
 /// # Errors
-/// A sentence with path, line and problem.
-pub fn read_obj_parts(path: &Path, metres_per_unit: f64) -> Result<Vec<Vec<Point3<f64>>>, String> {
-    let text = std::fs::read_to_string(path).map_err(|e| format!("{} cannot be read: {e}", path.display()))?;
-    parse_parts(&text, metres_per_unit).map_err(|e| format!("{}: {e}", path.display()))
-}
-
-fn parse_parts(text: &str, metres_per_unit: f64) -> Result<Vec<Vec<Point3<f64>>>, String> {
+/// A sentence with line and problem, without words of the text: clients may name files that they cannot read.
+pub fn parse_obj_parts(text: &str, metres_per_unit: f64) -> Result<Vec<Vec<Point3<f64>>>, String> {
     let mut vertices: Vec<Point3<f64>> = Vec::new();
     let mut parts: Vec<BTreeSet<usize>> = vec![BTreeSet::new()];
     for (i, line) in text.lines().enumerate() {
@@ -25,7 +19,7 @@ fn parse_parts(text: &str, metres_per_unit: f64) -> Result<Vec<Vec<Point3<f64>>>
             Some("f") => {
                 let part = parts.last_mut().expect("starts with one part");
                 for word in words {
-                    part.insert(index(word, vertices.len()).ok_or(format!("line {}: bad face `{word}`", i + 1))?);
+                    part.insert(index(word, vertices.len()).ok_or(format!("line {}: bad face", i + 1))?);
                 }
             }
             _ => {}
@@ -61,13 +55,13 @@ mod tests {
     #[test]
     fn groups_become_parts_and_indices_count_from_one_or_from_the_end() {
         let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\no a\nf 1 2 3\nf 1/1 2/1 4/1\no b\nf -1 -2 -3 -4\n";
-        let parts = parse_parts(text, 0.001).unwrap();
+        let parts = parse_obj_parts(text, 0.001).unwrap();
         assert_eq!(parts.iter().map(Vec::len).collect::<Vec<_>>(), [4, 4]);
         assert_eq!(parts[0][1].x, 0.001);
     }
 
     #[test]
     fn a_face_beyond_the_vertices_is_named_by_line() {
-        assert!(parse_parts("v 0 0 0\nf 1 2 3\n", 1.0).unwrap_err().contains("line 2"));
+        assert!(parse_obj_parts("v 0 0 0\nf 1 2 3\n", 1.0).unwrap_err().contains("line 2"));
     }
 }

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
 use nalgebra::{Isometry3, Point3, Translation3};
-use plica_geometry::import::read_obj_parts;
 use plica_geometry::{ConvexPolytope, HullError};
 use plica_sim::{Coupling, Sampling, SpringCoupling, ToolDescription, ToolShape};
 
+use super::files::Parts;
 use super::raw::{RawCoupling, RawSampling, RawShape, RawTool, RawTransform};
 use crate::checks::Check;
 use crate::error::ConfigError;
@@ -18,20 +18,24 @@ const MAX_TOOLS: usize = 16;
 const HULL_POINTS: RangeInclusive<usize> = 4..=1000;
 
 /// All tools in alphabetical order.
-pub(super) fn check(c: &Check<'_>, tools: &BTreeMap<String, RawTool>) -> Result<Vec<ToolDescription>, ConfigError> {
+pub(super) fn check(
+    c: &Check<'_>,
+    tools: &BTreeMap<String, RawTool>,
+    parts: Parts<'_>,
+) -> Result<Vec<ToolDescription>, ConfigError> {
     if tools.len() > MAX_TOOLS {
         let problem = format!("{} tools; the allowed range is 0 to {MAX_TOOLS}", tools.len());
         return Err(c.error("tools", problem, "remove tools, or run a second daemon with another --session"));
     }
-    tools.iter().map(|(name, raw)| check_tool(c, name, raw)).collect()
+    tools.iter().map(|(name, raw)| check_tool(c, name, raw, parts)).collect()
 }
 
-fn check_tool(c: &Check<'_>, name: &str, raw: &RawTool) -> Result<ToolDescription, ConfigError> {
+fn check_tool(c: &Check<'_>, name: &str, raw: &RawTool, parts: Parts<'_>) -> Result<ToolDescription, ConfigError> {
     let key = |k: &str| format!("tools.{name}.{k}");
     c.name(&format!("tools.{name}"), name)?;
     Ok(ToolDescription {
         name: name.to_owned(),
-        shape: check_shape(c, &key("shape"), &raw.shape)?,
+        shape: check_shape(c, &key("shape"), &raw.shape, parts)?,
         coupling: check_coupling(c, &key, raw)?,
         friction: raw.friction,
         sampling: check_sampling(c, &key, raw)?,
@@ -49,7 +53,7 @@ fn check_transform(c: &Check<'_>, key: &str, raw: &RawTransform) -> Result<Isome
     Ok(Isometry3::from_parts(translation, rotation))
 }
 
-fn check_shape(c: &Check<'_>, key: &str, raw: &RawShape) -> Result<ToolShape, ConfigError> {
+fn check_shape(c: &Check<'_>, key: &str, raw: &RawShape, parts: Parts<'_>) -> Result<ToolShape, ConfigError> {
     match raw {
         RawShape::Ball { radius_m } => Ok(ToolShape::Ball { radius_m: *radius_m }),
         RawShape::Capsule { radius_m, length_m } => Ok(ToolShape::Capsule { radius_m: *radius_m, length_m: *length_m }),
@@ -68,13 +72,18 @@ fn check_shape(c: &Check<'_>, key: &str, raw: &RawShape) -> Result<ToolShape, Co
         RawShape::Mesh { file, metres_per_unit } => {
             let key = format!("{key}.mesh");
             let path = c.document().file().parent().unwrap_or(std::path::Path::new("")).join(&file.0);
-            let hulls = read_obj_parts(&path, *metres_per_unit).map_err(|problem| {
-                c.error(&format!("{key}.file"), problem, "give an OBJ file whose groups are convex parts")
+            // As typed: a client of a daemon is not told its folders.
+            let named = |problem: String| format!("{}: {problem}", file.0);
+            let hulls = parts(&path, *metres_per_unit).map_err(|problem| {
+                c.error(&format!("{key}.file"), named(problem), "give an OBJ file whose groups are convex parts")
             })?;
             let polytopes = hulls.into_iter().map(ConvexPolytope::hull).collect::<Result<_, _>>();
             let flat = |e: HullError| {
-                let problem = format!("{}: {e}", path.display());
-                c.error(&format!("{key}.file"), problem, "give an OBJ file whose groups have a volume each")
+                c.error(
+                    &format!("{key}.file"),
+                    named(e.to_string()),
+                    "give an OBJ file whose groups have a volume each",
+                )
             };
             Ok(ToolShape::Compound { polytopes: polytopes.map_err(flat)? })
         }
