@@ -162,7 +162,7 @@ pub struct JobFetchRequest {
 /// A job with its status and progress. Reply of `job_get`, `job_cancel` and `job_resume`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Job {
-    /// Id from the daemon: a number of at least four digits. Later jobs have larger numbers.
+    /// Id from the daemon: a number of four digits or more. Later jobs have larger numbers; as text, `10000` is before `9999`.
     pub id: String,
     /// Id from the client.
     pub client_id: String,
@@ -225,6 +225,9 @@ pub struct JobListReply {
     /// Number of older jobs that the list leaves out; `job_get` returns them by id.
     #[serde(default)]
     pub older: u32,
+    /// Number of finished jobs that the daemon has removed since its start, beyond those that it keeps.
+    #[serde(default)]
+    pub removed: u32,
 }
 
 /// Message on `job_progress`, published when a job has changed.

@@ -210,7 +210,7 @@ impl RestoreRequest {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActivateRequest {
-    /// Id of a finished job (digits only), or path of a database on the daemon's machine.
+    /// Id of a finished job (digits only), or name of a file in the folder of databases that the daemon was started with.
     pub database: String,
 }
 

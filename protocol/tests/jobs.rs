@@ -66,7 +66,7 @@ fn replies_are_flat_and_come_back() {
     assert!(json["seed"].is_null() && json["reason"].is_null());
     let reply = comes_back(&JobSubmitReply { created: true, job: job.clone() });
     assert_eq!((&reply["created"], &reply["id"]), (&true.into(), &"0003".into()));
-    comes_back(&JobListReply { jobs: vec![job.clone()], older: 7 });
+    comes_back(&JobListReply { jobs: vec![job.clone()], older: 7, removed: 3 });
     let progress = comes_back(&JobProgressMessage::from(&job));
     assert_eq!((&progress["stage"], &progress["rejected"]), (&"examples".into(), &1.into()));
     let status = comes_back(&JobStatus::from(&job));

@@ -91,8 +91,8 @@ impl Client {
         self.call(Method::Interrupt.name(), &EmptyRequest {})
     }
 
-    /// Activates other examples: `database` is the id of a finished job, or a path on the daemon's machine. Takes seconds,
-    /// during which the simulation continues with the present examples.
+    /// Activates other examples: `database` is the id of a finished job, or the name of a file in the folder that the daemon was
+    /// started with (`--databases`). Takes seconds, during which the simulation continues with the present examples.
     pub fn activate(&self, database: &str) -> Result<ActivateReply, ClientError> {
         self.call(Method::Activate.name(), &ActivateRequest { database: database.to_owned() })
     }

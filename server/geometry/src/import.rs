@@ -20,7 +20,7 @@ use std::path::Path;
 pub use error::{ImportError, Place};
 pub use groups::{Group, Groups};
 pub use named_mesh::NamedMesh;
-pub use obj::{ObjPart, read_obj_parts};
+pub use obj::{ObjPart, parse_obj_parts};
 pub use options::ReadOptions;
 
 use error::{Fault, fault};

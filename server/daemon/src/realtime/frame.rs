@@ -11,7 +11,7 @@ pub struct Frame {
     pub sim_time_s: f64,
     /// Source time of the newest pose of any tool \[ns\].
     pub newest_pose_source_time_ns: u64,
-    /// Whether a state was rolled back since the frame before.
+    /// Whether a state was rolled back since the frame before, or detail that was not finite was left out.
     pub degraded: bool,
     /// Whether the object is at rest and this is a repeat.
     pub sleeping: bool,

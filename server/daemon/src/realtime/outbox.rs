@@ -156,6 +156,7 @@ impl Outbox {
         frame.due = self.due;
         frame.answers = questions;
         detail.write_skin(model, state, &mut frame.positions, probe);
+        frame.degraded |= detail.is_left_out();
         frame.confidence = detail.least_confidence().unwrap_or(0.0);
         frame.database_generation = detail.generation();
         self.degraded &= !due;

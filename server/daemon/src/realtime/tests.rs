@@ -251,6 +251,11 @@ fn reset_returns_to_rest_and_forgets_waiting_poses() {
 
 /// A detail of 1 mm downwards wherever the ball presses the middle.
 fn live(model: &Arc<plica_sim::Model>) -> Box<LiveEnrichment> {
+    live_scaled(model, 0.5)
+}
+
+/// The same with a detail of `scale` times the dent.
+fn live_scaled(model: &Arc<plica_sim::Model>, scale: f32) -> Box<LiveEnrichment> {
     let description = model.description();
     let touch = |depth: f64| Touch {
         contact_point: nalgebra::Point3::new(0.02, 0.02, 0.02),
@@ -262,7 +267,7 @@ fn live(model: &Arc<plica_sim::Model>) -> Box<LiveEnrichment> {
             [0.0, 0.0, -(depth * (-off_squared / 1e-4).exp() * p.z / 0.02) as f32]
         };
         let nodes = description.mesh.nodes().iter().map(dent).collect();
-        let detail = description.skin.positions().iter().map(|p| dent(p).map(|x| 0.5 * x)).collect();
+        let detail = description.skin.positions().iter().map(|p| dent(p).map(|x| scale * x)).collect();
         (nodes, detail)
     };
     let depths = [0.001, 0.002, 0.003];
@@ -294,6 +299,24 @@ fn activating_changes_the_skin_and_nothing_else() {
     order(&mut core, &mut ports, step(2, press(2, 0.024))).unwrap();
     assert!(ports.wrenches[0].wrenches.pop().unwrap().confidence > 0.0);
     assert!(ports.readings.read().confidence.unwrap() > 0.0);
+}
+
+#[test]
+fn detail_that_is_not_finite_is_left_out_of_a_degraded_frame() {
+    let (mut core, mut ports) = start(true);
+    let press = |sequence, z| vec![ToolPose { tool: 0, sample: sample(sequence, z) }];
+    order(&mut core, &mut ports, Command::Step { ticks: 100, poses: press(1, 0.024) }).unwrap();
+    let coarse = positions(&mut core, &mut ports);
+    let own = live_scaled(core.model(), f32::INFINITY);
+    order(&mut core, &mut ports, Command::Activate(own)).unwrap();
+    assert_eq!(positions(&mut core, &mut ports), coarse);
+    let frame = ports.frames.frames.output_buffer();
+    assert!(frame.degraded && frame.confidence == 0.0 && frame.database_generation == 1);
+    // Other examples end it.
+    let other = live(core.model());
+    order(&mut core, &mut ports, Command::Activate(other)).unwrap();
+    assert_ne!(positions(&mut core, &mut ports), coarse);
+    assert!(!ports.frames.frames.output_buffer().degraded);
 }
 
 #[test]

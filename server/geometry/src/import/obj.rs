@@ -1,7 +1,6 @@
 //! Parts of a tool from an OBJ file: every group or object is one part.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use nalgebra::Point3;
 
@@ -18,17 +17,6 @@ pub struct ObjPart {
     pub triangles: Vec<[usize; 3]>,
 }
 
-/// Reads the parts of an OBJ file; faces decide which part a vertex belongs to.
-///
-/// # Errors
-/// A sentence with path, line and problem.
-pub fn read_obj_parts(path: &Path, metres_per_unit: f64) -> Result<Vec<ObjPart>, String> {
-    let bytes = std::fs::read(path).map_err(|e| format!("{} cannot be read: {e}", path.display()))?;
-    // Names may be in any encoding; numbers and keywords are ASCII.
-    let text = String::from_utf8_lossy(&without_mark(&bytes)).into_owned();
-    parse_parts(&text, metres_per_unit).map_err(|e| format!("{}: {e}", path.display()))
-}
-
 /// A part with vertices by their numbers in the file.
 #[derive(Default)]
 struct RawPart {
@@ -36,7 +24,14 @@ struct RawPart {
     faces: Vec<Vec<usize>>,
 }
 
-fn parse_parts(text: &str, metres_per_unit: f64) -> Result<Vec<ObjPart>, String> {
+/// Parts in the content of an OBJ file; faces decide which part a vertex belongs to.
+///
+/// # Errors
+/// A sentence with line and problem, without words of the file: clients may name files that they cannot read.
+pub fn parse_obj_parts(bytes: &[u8], metres_per_unit: f64) -> Result<Vec<ObjPart>, String> {
+    // Names may be in any encoding; numbers and keywords are ASCII.
+    let content = without_mark(bytes);
+    let text = String::from_utf8_lossy(&content);
     let mut vertices: Vec<Point3<f64>> = Vec::new();
     let mut parts: Vec<RawPart> = vec![RawPart::default()];
     for (i, line) in text.lines().enumerate() {
@@ -49,7 +44,7 @@ fn parse_parts(text: &str, metres_per_unit: f64) -> Result<Vec<ObjPart>, String>
             }
             Some("f") => {
                 let known = vertices.len();
-                let corner = |word| index(word, known).ok_or(format!("line {}: bad face `{word}`", i + 1));
+                let corner = |word| index(word, known).ok_or(format!("line {}: bad face", i + 1));
                 let face = words.map(corner).collect::<Result<_, _>>()?;
                 parts.last_mut().expect("starts with one part").faces.push(face);
             }
@@ -58,8 +53,8 @@ fn parse_parts(text: &str, metres_per_unit: f64) -> Result<Vec<ObjPart>, String>
     }
     let with_faces = parts.iter().filter(|part| !part.faces.is_empty()).enumerate();
     let parts: Vec<ObjPart> = with_faces.map(|(i, part)| part.gather(i, &vertices)).collect();
-    match parts.iter().find(|part| part.points.len() < 4) {
-        Some(part) => Err(format!("part `{}` has {} vertices; at least 4 are needed", part.name, part.points.len())),
+    match parts.iter().enumerate().find(|(_, part)| part.points.len() < 4) {
+        Some((i, part)) => Err(format!("part {} has {} vertices; at least 4 are needed", i + 1, part.points.len())),
         None if parts.is_empty() => Err("there is no face".into()),
         None => Ok(parts),
     }
@@ -105,7 +100,7 @@ mod tests {
     #[test]
     fn groups_become_parts_and_indices_count_from_one_or_from_the_end() {
         let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\no a\nf 1 2 3\nf 1/1 2/1 4/1\no b c\nf -1 -2 -3 -4\n";
-        let parts = parse_parts(text, 0.001).unwrap();
+        let parts = parse_obj_parts(text.as_bytes(), 0.001).unwrap();
         assert_eq!(parts.iter().map(|part| part.points.len()).collect::<Vec<_>>(), [4, 4]);
         assert_eq!(parts.iter().map(|part| part.name.as_str()).collect::<Vec<_>>(), ["a", "b c"]);
         assert_eq!(parts[0].points[1].x, 0.001);
@@ -115,6 +110,6 @@ mod tests {
 
     #[test]
     fn a_face_beyond_the_vertices_is_named_by_line() {
-        assert!(parse_parts("v 0 0 0\nf 1 2 3\n", 1.0).unwrap_err().contains("line 2"));
+        assert!(parse_obj_parts(b"v 0 0 0\nf 1 2 3\n", 1.0).unwrap_err().contains("line 2"));
     }
 }

@@ -61,7 +61,9 @@ fn check(config: &Config) -> anyhow::Result<Report> {
     let publish = config.object().publish();
     let frame_bytes = frame_bytes(config, model.n_skin());
     let (estimated_tick_us, estimate) = match config.bench() {
-        Some(motion) => (bench(config, motion, TRIAL_TICKS)?.tick_us.p50, "median of a trial of the [bench] motion"),
+        Some(motion) => {
+            (bench(config, motion, TRIAL_TICKS, TRIAL_TICKS)?.tick_us.p50, "median of a trial of the [bench] motion")
+        }
         None => {
             let (bytes, flops) = work(&model, TYPICAL.0, TYPICAL.1);
             let limit_s = Roofline::measure(table_bytes(&model)).limit_s(bytes, flops);
