@@ -78,6 +78,7 @@ pub fn describe(config: &Config) -> Result<ModelDescription, SceneModelError> {
         sleep: *config.sleep(),
         tools: config.tools().to_vec(),
         planes: config.planes().to_vec(),
+        bounds_m: object.bounds_m(),
     })
 }
 

@@ -32,6 +32,9 @@ struct Report {
     n_triangles: usize,
     embedding_fallbacks: usize,
     block_tridiagonal: bool,
+    is_free: bool,
+    room_min_mm: [f64; 3],
+    room_max_mm: [f64; 3],
     table_bytes: usize,
     frame_bytes: u64,
     skin_bytes_per_s: f64,
@@ -58,6 +61,7 @@ fn check(config: &Config) -> anyhow::Result<Report> {
     let model = model::build(config)?;
     check_frame(config, model.n_skin())?;
     let cost = model.cost();
+    let room_mm = model.room_m().map(|corner| (corner.coords * 1e3).into());
     let publish = config.object().publish();
     let frame_bytes = frame_bytes(config, model.n_skin());
     let (estimated_tick_us, estimate) = match config.bench() {
@@ -88,6 +92,9 @@ fn check(config: &Config) -> anyhow::Result<Report> {
         n_triangles: model.description().skin.n_triangles(),
         embedding_fallbacks: model.description().embedding.fallbacks().len(),
         block_tridiagonal: cost.block_tridiagonal,
+        is_free: model.is_free(),
+        room_min_mm: room_mm[0],
+        room_max_mm: room_mm[1],
         table_bytes: table_bytes(&model),
         frame_bytes,
         skin_bytes_per_s: frame_bytes as f64 * publish.publish_hz,
@@ -112,6 +119,15 @@ fn print(r: &Report) {
     println!(
         "skin       {} vertices, {} triangles, {} vertices embedded trilinearly",
         r.n_skin, r.n_triangles, r.embedding_fallbacks
+    );
+    let axis = |k: usize| format!("{} {:.0} to {:.0}", ["x", "y", "z"][k], r.room_min_mm[k], r.room_max_mm[k]);
+    let (held, end) = match r.is_free {
+        true => ("no node is held, so that the object falls and slides", "where it began"),
+        false => ("held", "the last good state"),
+    };
+    println!(
+        "room       {} mm ({held}); once out, the object is put back to {end}, and counted",
+        [0, 1, 2].map(axis).join(", ")
     );
     println!("tables     {:.0} KiB read per tick or more often", r.table_bytes as f64 / 1024.0);
     println!("frame      {} bytes, {:.1} MB/s to each listener", r.frame_bytes, 1e-6 * r.skin_bytes_per_s);
