@@ -146,7 +146,7 @@ fn a_tool_out_of_sight_touches_nothing_and_is_told() {
 fn a_run_that_does_not_fit_or_takes_hours_is_refused_before_it_starts() {
     let folder = TempDir::new().unwrap();
     let (poses, out) = (folder.path().join("poses.tum"), folder.path().join("out.safetensors"));
-    fs::write(&poses, "0 0.05 0.03 0.04 0 0 0 1\n9e9 0.05 0.03 0.04 0 0 0 1\n").unwrap();
+    fs::write(&poses, "0 0.05 0.03 0.04 0 0 0 1\n9e6 0.05 0.03 0.04 0 0 0 1\n").unwrap();
     let arguments =
         ["simulate", "wedge", "--poses", poses.to_str().unwrap(), "--out", out.to_str().unwrap(), "--time-unit", "s"];
     let refused = errors(&plicad(&arguments));
