@@ -89,7 +89,90 @@ fn a_recorded_hand_motion_is_simulated() {
     let arguments = ["simulate", "wedge", "--poses", recorded, "--fit", "--out", out, "--every", "100", "--json"];
     let summary = last_line(&plicad(&arguments));
     assert_eq!(summary["rollbacks"], 0, "{summary}");
+    let motion = &summary["motion"];
+    assert!(motion["rows"] == motion["poses"] && motion["duration_s"].as_f64().unwrap() > 30.0, "{summary}");
     assert!(summary["n_frames"].as_u64().unwrap() > 100, "{summary}");
+}
+
+/// A press of the wedge, 1.5 s at 60 Hz: `row` writes one from its number.
+fn write_press(path: &Path, header: &str, row: impl Fn(u32, f64) -> String) {
+    let height_m = |k: u32| 0.04 - 0.01 * (std::f64::consts::PI * f64::from(k) / 90.0).sin();
+    let rows: String = (0..=90).map(|k| row(k, height_m(k)) + "\n").collect();
+    fs::write(path, format!("{header}{rows}")).unwrap();
+}
+
+#[test]
+fn poses_of_any_origin_and_unit_press_alike() {
+    let folder = TempDir::new().unwrap();
+    let (poses, out) = (folder.path().join("poses.tum"), folder.path().join("out.safetensors"));
+    let peak = |origin: f64, unit: f64| {
+        write_press(&poses, "", |k, z| format!("{:.6} 0.05 0.03 {z} 0 0 0 1", origin + unit * f64::from(k) / 60.0));
+        let said = simulate(&poses, &out);
+        assert!(said["n_ticks"] == 1501 && said["remarks"] == serde_json::json!([]), "{said}");
+        said["peak_force_n"].as_f64().unwrap()
+    };
+    let plain = peak(0.0, 1.0);
+    assert!(plain > 0.5, "{plain} N");
+    for (origin, unit) in
+        [(-0.75, 1.0), (5.0, 1.0), (1.7e9, 1.0), (0.0, 1e3), (1.7e12, 1e3), (77.0, 1e6), (1.7e18, 1e9)]
+    {
+        let other = peak(origin, unit);
+        assert!((other / plain - 1.0).abs() < 0.02, "{other} N from {origin} by {unit}, {plain} N from 0 s");
+    }
+}
+
+#[test]
+fn a_tool_out_of_sight_touches_nothing_and_is_told() {
+    let folder = TempDir::new().unwrap();
+    let (poses, out) = (folder.path().join("poses.tum"), folder.path().join("out.safetensors"));
+    let seen = |k: u32, z: f64| format!("{:.6} 0.05 0.03 {z} 0 0 0 1", f64::from(k) / 60.0);
+    let lost = |k: u32| format!("{:.6} 0 0 0 0 0 0 1", f64::from(k) / 60.0);
+    write_press(&poses, "", seen);
+    let whole = simulate(&poses, &out)["peak_force_n"].as_f64().unwrap();
+    write_press(&poses, "", |k, z| if (40..52).contains(&k) { lost(k) } else { seen(k, z) });
+    let (poses, out) = (poses.to_str().unwrap(), out.to_str().unwrap());
+    let arguments = ["simulate", "wedge", "--poses", poses, "--out", out, "--every", "5"];
+    let refused = errors(&plicad(&arguments));
+    assert!(
+        refused.contains("poses.tum:41: the tool jumps to the origin") && refused.contains("--on-bad-row skip"),
+        "{refused}"
+    );
+    let said = last_line(&plicad(&[&arguments[..], &["--on-bad-row", "skip", "--json"]].concat()));
+    assert_eq!(said["motion"]["skipped"], serde_json::json!({"lost": 12}), "{said}");
+    assert!(said["peak_force_n"].as_f64().unwrap() < 1.05 * whole, "{said}");
+}
+
+#[test]
+fn a_run_that_does_not_fit_or_takes_hours_is_refused_before_it_starts() {
+    let folder = TempDir::new().unwrap();
+    let (poses, out) = (folder.path().join("poses.tum"), folder.path().join("out.safetensors"));
+    fs::write(&poses, "0 0.05 0.03 0.04 0 0 0 1\n9e6 0.05 0.03 0.04 0 0 0 1\n").unwrap();
+    let arguments =
+        ["simulate", "wedge", "--poses", poses.to_str().unwrap(), "--out", out.to_str().unwrap(), "--time-unit", "s"];
+    let refused = errors(&plicad(&arguments));
+    assert!(refused.contains("more than the disk has free") && refused.contains("--no-limits"), "{refused}");
+    let refused = errors(&plicad(&[&arguments[..], &["--every", "1000000"]].concat()));
+    assert!(refused.contains("hours") && refused.contains("--no-limits"), "{refused}");
+    assert!(!out.exists());
+}
+
+#[test]
+fn a_quaternion_with_w_first_is_asked_about() {
+    let folder = TempDir::new().unwrap();
+    let (poses, out) = (folder.path().join("poses.csv"), folder.path().join("out.safetensors"));
+    let row = |k: u32, z: f64| format!("{:.6},probe,0.05,0.03,{z},1,0,0,0", f64::from(k) / 60.0);
+    write_press(&poses, "time_s,tool,px,py,pz,qx,qy,qz,qw\n", row);
+    let arguments =
+        ["simulate", "wedge", "--poses", poses.to_str().unwrap(), "--out", out.to_str().unwrap(), "--every", "50"];
+    let question = errors(&plicad(&arguments));
+    assert!(
+        question.contains("`probe` starts upside down") && question.contains("--quaternion-order wxyz"),
+        "{question}"
+    );
+    let with = |order: &str| last_line(&plicad(&[&arguments[..], &["--quaternion-order", order, "--json"]].concat()));
+    assert_eq!(with("wxyz")["remarks"], serde_json::json!([]));
+    let remarks = with("xyzw")["remarks"].to_string();
+    assert!(remarks.contains("upside down") && remarks.contains("inside the object"), "{remarks}");
 }
 
 #[test]
@@ -102,7 +185,8 @@ fn check_says_what_a_scene_costs() {
         assert!(said["frame_bytes"].as_u64().unwrap() >= 64 + 12 * n_skin, "{said}");
     }
     let spoken = plicad(&["check", "wedge"]);
-    assert!(String::from_utf8_lossy(&spoken.stdout).contains("128 hexahedra"));
+    let spoken = String::from_utf8_lossy(&spoken.stdout);
+    assert!(spoken.contains("128 hexahedra") && spoken.contains("`probe` steps with each pose"), "{spoken}");
 }
 
 #[test]

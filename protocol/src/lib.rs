@@ -9,6 +9,7 @@
 
 mod bytes;
 pub mod chunk;
+pub mod encoding;
 mod error;
 pub mod jobs;
 pub mod keys;
@@ -25,7 +26,7 @@ pub use error::DecodeError;
 /// Version of every binary message, and the `v1` of every key.
 pub const VERSION: u16 = 1;
 
-/// Encoding of JSON payloads; a pose with this encoding is decoded as JSON.
+/// Encoding of JSON payloads; a pose whose encoding says JSON in any way ([`encoding::is_json`]) is read as JSON.
 pub const ENCODING_JSON: &str = "application/json";
 
 /// Encoding of binary payloads, and of payloads without a named encoding.

@@ -4,10 +4,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use plica_protocol::encoding::is_json;
 use plica_protocol::keys::check_name;
 use plica_protocol::skin::{SkinFrame, SkinHeader};
 use plica_protocol::wrench::Wrench;
-use plica_protocol::{DecodeError, ENCODING_JSON};
+use plica_protocol::{DecodeError, ENCODING_BYTES};
 use zenoh::Wait;
 use zenoh::bytes::Encoding;
 use zenoh::pubsub::Subscriber;
@@ -111,12 +112,12 @@ impl Client {
         key_expressions: &[String],
         capacity: usize,
     ) -> Result<Subscription<RawMessage>, ClientError> {
-        let json = Encoding::from(ENCODING_JSON);
+        let binary = Encoding::from(ENCODING_BYTES);
         self.subscribe(key_expressions, Queue::new(capacity, Overflow::DropNewest), move |sample| {
             let message = RawMessage {
                 key: sample.key_expr().as_str().to_owned(),
                 bytes: sample.payload().to_bytes().into_owned(),
-                json: *sample.encoding() == json,
+                json: *sample.encoding() != binary && is_json(&sample.encoding().to_string()),
                 received: Instant::now(),
             };
             Ok((message, None))

@@ -25,6 +25,14 @@ pub enum TrajectoryError {
         /// What is wrong.
         message: String,
     },
+    /// Times in a unit that cannot be told.
+    #[error("{}: {message}", path.display())]
+    TimeUnit {
+        /// The file.
+        path: PathBuf,
+        /// What fits, and how to say it.
+        message: String,
+    },
     /// A file without poses.
     #[error("{}: the file has no poses", path.display())]
     Empty {

@@ -1,12 +1,23 @@
-//! Reading trajectory files.
+//! Reading motion files.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 use crate::error::TrajectoryError;
-use crate::pose::{CSV_HEADER, TrackedPose};
+use crate::layout::Layout;
+use crate::options::{OnBadRow, QuaternionOrder, ReadOptions};
+use crate::order::{first_step_back, judge};
+use crate::pose::TrackedPose;
+use crate::report::{BadRow, MotionReport};
+use crate::rows::{Fault, Row, Rows, content_lines, read_rows};
+use crate::time::{Stamp, TimeUnit, recognise};
 
-const TUM_COLUMNS: [&str; 8] = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"];
+/// A step is a gap if it takes this many medians ...
+const GAP_MEDIANS: f64 = 10.0;
+/// ... and this long \[s\].
+const GAP_S: f64 = 0.1;
+/// What else can be done about a row that cannot be played.
+const SKIP: &str = "mend the row, or leave out such rows with --on-bad-row skip (in a scene: on_bad_row = \"skip\")";
 
 /// Check of a pose: maps tool, position \[m\] and orientation `xyzw` of a line to the normalised orientation, or to a sentence
 /// why the line is refused.
@@ -14,116 +25,156 @@ pub trait Gate: Fn(Option<&str>, [f64; 3], [f64; 4]) -> Result<[f64; 4], String>
 
 impl<F: Fn(Option<&str>, [f64; 3], [f64; 4]) -> Result<[f64; 4], String>> Gate for F {}
 
-/// Reads a trajectory, CSV or TUM (see the crate). The result has at least one pose, and each has passed `gate`.
+/// A motion from a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trajectory {
+    /// At least one pose, in order of time; the first is at 0.
+    pub poses: Vec<TrackedPose>,
+    /// What the file held.
+    pub report: MotionReport,
+}
+
+/// Reads a motion file, CSV or TUM (see the crate). Each pose has passed `gate`.
 ///
 /// # Errors
 /// [`TrajectoryError`] with file and line.
-pub fn read(path: impl AsRef<Path>, gate: impl Gate) -> Result<Vec<TrackedPose>, TrajectoryError> {
+pub fn read(path: impl AsRef<Path>, options: ReadOptions, gate: impl Gate) -> Result<Trajectory, TrajectoryError> {
     let path = path.as_ref();
     let bytes = std::fs::read(path).map_err(|source| TrajectoryError::Io { path: path.to_owned(), source })?;
     let at_line = |(line, message)| TrajectoryError::Line { path: path.to_owned(), line, message };
-    let text = std::str::from_utf8(&bytes).map_err(|error| at_line(not_text(&bytes, error.valid_up_to())))?;
-    let numbered = if is_csv(path, text) { csv_poses(text, &gate) } else { tum_poses(text, &gate) }.map_err(at_line)?;
-    check_order(&numbered).map_err(at_line)?;
-    if numbered.is_empty() {
-        return Err(TrajectoryError::Empty { path: path.to_owned() });
-    }
-    Ok(numbered.into_iter().map(|(_, pose)| pose).collect())
+    let text = text_of(&bytes).map_err(at_line)?;
+    let empty = || TrajectoryError::Empty { path: path.to_owned() };
+    let mut lines = content_lines(&text).peekable();
+    let Some(&(first_line, first)) = lines.peek() else { return Err(empty()) };
+    let named_csv = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
+    let layout = Layout::of(first, named_csv).map_err(|message| at_line((first_line, message)))?;
+    // Named columns are in place already; the option is for columns that are named otherwise, or not at all.
+    let order = options.quaternion_order.filter(|_| !layout.names_w_first).unwrap_or(QuaternionOrder::Xyzw);
+    let rows = read_rows(lines.skip(usize::from(layout.has_header)), &layout, order, &gate);
+    let rows = playable(rows, options.on_bad_row).map_err(at_line)?;
+    let first = rows.good.first().ok_or_else(empty)?.stamp;
+    let steps = steps(&rows.good);
+    let asked = options.time_unit.or(layout.time_unit);
+    let unit = time_unit(asked, first, &steps, rows.good.len());
+    let unit = unit.map_err(|message| TrajectoryError::TimeUnit { path: path.to_owned(), message })?;
+    let report = MotionReport {
+        time_unit_recognised: asked.is_none(),
+        quaternion_order: if layout.names_w_first { QuaternionOrder::Wxyz } else { order },
+        quaternion_order_assumed: !layout.names_w_first && options.quaternion_order.is_none(),
+        ..report(&rows, unit, &steps)
+    };
+    let poses = rows.good.into_iter().map(|row| pose(row, first, unit)).collect();
+    Ok(Trajectory { poses, report })
 }
 
-/// Line number, from 1 on, and error.
-type Fault = (u64, String);
+/// A line number, from 1 on, and a sentence.
+type AtLine = (u64, String);
 
-fn not_text(bytes: &[u8], at: usize) -> Fault {
+/// The text without byte-order mark, with one kind of line end.
+fn text_of(bytes: &[u8]) -> Result<String, AtLine> {
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return Err((1, "the file is UTF-16; save it as UTF-8".to_owned()));
+    }
+    let text = std::str::from_utf8(bytes).map_err(|error| not_text(bytes, error.valid_up_to()))?;
+    Ok(text.strip_prefix('\u{feff}').unwrap_or(text).replace("\r\n", "\n").replace('\r', "\n"))
+}
+
+fn not_text(bytes: &[u8], at: usize) -> AtLine {
     let line = 1 + bytes[..at].iter().filter(|byte| **byte == b'\n').count() as u64;
     (line, "not text".to_owned())
 }
 
-fn is_csv(path: &Path, text: &str) -> bool {
-    let content = |line: &&str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
-    let named_csv = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
-    named_csv || text.lines().find(content).is_some_and(|line| line.contains(','))
-}
-
-fn csv_poses(text: &str, gate: &impl Gate) -> Result<Vec<(u64, TrackedPose)>, Fault> {
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
-    let header = reader.headers().map_err(csv_fault)?;
-    if header != CSV_HEADER.as_slice() {
-        return Err((1, format!("the header must be `{}`", CSV_HEADER.join(","))));
-    }
-    reader.into_records().map(|record| csv_pose(&record.map_err(csv_fault)?, gate)).collect()
-}
-
-fn csv_fault(error: csv::Error) -> Fault {
-    let line = error.position().map_or(1, csv::Position::line);
-    let message = match error.kind() {
-        csv::ErrorKind::UnequalLengths { len, expected_len, .. } => format!("{len} columns, expected {expected_len}"),
-        _ => error.to_string(),
-    };
-    (line, message)
-}
-
-fn csv_pose(record: &csv::StringRecord, gate: &impl Gate) -> Result<(u64, TrackedPose), Fault> {
-    let line = record.position().map_or(0, csv::Position::line);
-    let number = |i: usize| number(CSV_HEADER[i], &record[i]).map_err(|message| (line, message));
-    let tool = Some(&record[1]).filter(|name| !name.is_empty());
-    let mut values = [0.0; 8];
-    for (value, column) in values.iter_mut().zip([0, 2, 3, 4, 5, 6, 7, 8]) {
-        *value = number(column)?;
-    }
-    let pose = checked(values, tool, gate).map_err(|message| (line, message))?;
-    Ok((line, pose))
-}
-
-fn tum_poses(text: &str, gate: &impl Gate) -> Result<Vec<(u64, TrackedPose)>, Fault> {
-    let mut poses = Vec::new();
-    for (line, content) in (1..).zip(text.lines()) {
-        let content = content.split('#').next().unwrap_or_default().trim();
-        if !content.is_empty() {
-            poses.push((line, tum_pose(content, gate).map_err(|message| (line, message))?));
+/// The rows that are played, or the first row that cannot be, as the policy has it.
+fn playable(rows: Rows, policy: OnBadRow) -> Result<Rows, AtLine> {
+    let step_back = first_step_back(&rows.good);
+    let judged = judge(rows);
+    let first = judged.bad.iter().chain(&step_back).min_by_key(|fault| fault.line);
+    let refused = |fault: &Fault| (fault.line, format!("{}; {SKIP}", fault.message));
+    match (policy, first) {
+        (OnBadRow::Error, Some(fault)) => Err(refused(fault)),
+        (OnBadRow::Skip, Some(fault)) if judged.good.is_empty() => {
+            Err((fault.line, format!("no row can be played: {}", fault.message)))
         }
+        _ => clock_runs_on(judged),
     }
-    let start_s = poses.first().map_or(0.0, |(_, pose)| pose.time_s);
-    poses.iter_mut().for_each(|(_, pose)| pose.time_s -= start_s);
-    Ok(poses)
 }
 
-fn tum_pose(content: &str, gate: &impl Gate) -> Result<TrackedPose, String> {
-    let columns: Vec<&str> = content.split_whitespace().collect();
-    let columns: [&str; 8] = columns
-        .try_into()
-        .map_err(|got: Vec<&str>| format!("{} columns, expected `{}`", got.len(), TUM_COLUMNS.join(" ")))?;
-    let mut values = [0.0; 8];
-    for (i, value) in values.iter_mut().enumerate() {
-        *value = number(TUM_COLUMNS[i], columns[i])?;
-    }
-    checked(values, None, gate)
-}
-
-fn number(column: &str, text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| format!("`{column}` is `{text}`, expected a number"))?;
-    value.is_finite().then_some(value).ok_or_else(|| format!("`{column}` is `{text}`, expected a finite number"))
-}
-
-/// `[time, position, orientation]` through the gate.
-fn checked(values: [f64; 8], tool: Option<&str>, gate: &impl Gate) -> Result<TrackedPose, String> {
-    let [time_s, px, py, pz, qx, qy, qz, qw] = values;
-    let position_m = [px, py, pz];
-    let orientation_xyzw = gate(tool, position_m, [qx, qy, qz, qw])?;
-    Ok(TrackedPose { time_s, tool: tool.map(str::to_owned), position_m, orientation_xyzw })
-}
-
-fn check_order(poses: &[(u64, TrackedPose)]) -> Result<(), Fault> {
-    let mut newest_s = f64::NEG_INFINITY;
-    let mut newest_of_tool: HashMap<Option<&str>, f64> = HashMap::new();
-    for (line, pose) in poses {
-        if pose.time_s < newest_s {
-            return Err((*line, format!("time {} s is before the line above it ({newest_s} s)", pose.time_s)));
+/// A clock that starts again in the midst of a file leaves no order to be had by leaving out rows.
+fn clock_runs_on(rows: Rows) -> Result<Rows, AtLine> {
+    let mut back = rows.bad.iter().filter(|fault| fault.kind == BadRow::OutOfOrder);
+    let n_back = back.clone().count();
+    match back.next() {
+        Some(fault) if 2 * n_back > rows.good.len() => {
+            let message =
+                format!("{}, and {} more rows: the clock starts again; split the file", fault.message, n_back - 1);
+            Err((fault.line, message))
         }
-        newest_s = pose.time_s;
-        if newest_of_tool.insert(pose.tool.as_deref(), newest_s).is_some_and(|before| before >= newest_s) {
-            return Err((*line, format!("a second pose of the same tool at {newest_s} s")));
-        }
+        _ => Ok(rows),
     }
-    Ok(())
+}
+
+/// Steps between poses of a tool in the file's unit, the shortest first.
+fn steps(rows: &[Row]) -> Vec<f64> {
+    let mut newest: HashMap<Option<&str>, Stamp> = HashMap::new();
+    let step = |row: &Row, before: Option<Stamp>| before.map(|before| row.stamp.since(before));
+    let mut steps: Vec<f64> =
+        rows.iter().filter_map(|row| step(row, newest.insert(row.tool.as_deref(), row.stamp))).collect();
+    steps.sort_by(f64::total_cmp);
+    steps
+}
+
+fn median(sorted: &[f64]) -> Option<f64> {
+    sorted.get(sorted.len() / 2).copied()
+}
+
+fn time_unit(asked: Option<TimeUnit>, first: Stamp, steps: &[f64], n_rows: usize) -> Result<TimeUnit, String> {
+    let (None, Some(step)) = (asked, median(steps)) else { return Ok(asked.unwrap_or(TimeUnit::Seconds)) };
+    recognise(first.value(), step, n_rows).map_err(|possible| {
+        let rate = |unit: &TimeUnit| format!("{} Hz in {}", digits(unit.per_second() / step), unit.name());
+        let rates: Vec<_> = possible.iter().map(rate).collect();
+        let names: Vec<_> = possible.iter().map(|unit| unit.name()).collect();
+        format!(
+            "the unit of its times cannot be told: {n_rows} rows, mostly {} apart, are {}; say it with --time-unit {} (in \
+             a scene: time_unit)",
+            digits(step),
+            rates.join(" or "),
+            names.join("|")
+        )
+    })
+}
+
+/// Three significant digits at least, no digits that say nothing.
+fn digits(value: f64) -> String {
+    if (0.01..1e6).contains(&value) { format!("{}", (value * 1e3).round() / 1e3) } else { format!("{value:.2e}") }
+}
+
+fn report(rows: &Rows, unit: TimeUnit, steps: &[f64]) -> MotionReport {
+    let seconds = |time: f64| time / unit.per_second();
+    let gap_s = median(steps).map_or(f64::INFINITY, |step| (GAP_MEDIANS * seconds(step)).max(GAP_S));
+    let mut skipped = BTreeMap::new();
+    rows.bad.iter().for_each(|fault| *skipped.entry(fault.kind).or_insert(0) += 1);
+    let ends = rows.good.first().zip(rows.good.last());
+    MotionReport {
+        rows: (rows.good.len() + rows.bad.len()) as u64,
+        poses: rows.good.len() as u64,
+        time_unit: unit,
+        time_unit_recognised: false,
+        quaternion_order: QuaternionOrder::Xyzw,
+        quaternion_order_assumed: false,
+        first_time: ends.map_or(0.0, |(first, _)| first.stamp.value()),
+        duration_s: ends.map_or(0.0, |(first, last)| seconds(last.stamp.since(first.stamp))),
+        rate_hz: median(steps).map(|step| 1.0 / seconds(step)),
+        gaps: steps.iter().filter(|step| seconds(**step) > gap_s).count() as u64,
+        longest_step_s: steps.last().map_or(0.0, |step| seconds(*step)),
+        skipped,
+    }
+}
+
+fn pose(row: Row, first: Stamp, unit: TimeUnit) -> TrackedPose {
+    TrackedPose {
+        time_s: row.stamp.since(first) / unit.per_second(),
+        tool: row.tool,
+        position_m: row.position_m,
+        orientation_xyzw: row.orientation_xyzw,
+    }
 }

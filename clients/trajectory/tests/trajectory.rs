@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use plica_protocol::pose::gate;
-use plica_trajectory::{Terrain, TrackedPose, Workspace, fit, fit_above, fitted_depth_m, read};
+use plica_trajectory::{ReadOptions, Terrain, TrackedPose, Workspace, fit, fit_above, fitted_depth_m, read};
 use tempfile::TempDir;
 
 fn read_text(name: &str, text: &str) -> Result<Vec<TrackedPose>, String> {
@@ -10,8 +10,12 @@ fn read_text(name: &str, text: &str) -> Result<Vec<TrackedPose>, String> {
     let path = folder.path().join(name);
     std::fs::write(&path, text).unwrap();
     let folder = format!("{}/", folder.path().display());
-    read(&path, gate).map_err(|error| error.to_string().replace(&folder, ""))
+    let read = read(&path, ReadOptions::default(), gate);
+    read.map(|motion| motion.poses).map_err(|error| error.to_string().replace(&folder, ""))
 }
+
+/// What an error of a bad row ends with.
+const SKIP: &str = "; mend the row, or leave out such rows with --on-bad-row skip (in a scene: on_bad_row = \"skip\")";
 
 const HEADER: &str = "time_s,tool,px,py,pz,qx,qy,qz,qw\n";
 
@@ -33,7 +37,7 @@ fn csv_of_two_tools() {
 #[test]
 fn csv_without_tool_names_and_without_the_extension() {
     let poses = read_text("poses", &format!("{HEADER}0.5,,0,0,0,0,0,0,1\n")).unwrap();
-    assert_eq!((poses[0].time_s, &poses[0].tool), (0.5, &None));
+    assert_eq!((poses[0].time_s, &poses[0].tool), (0.0, &None));
 }
 
 #[test]
@@ -48,30 +52,45 @@ fn tum_starts_at_zero_and_is_normalised() {
 
 #[test]
 fn faults_name_file_and_line() {
-    let csv = |rows: &str| read_text("a.csv", &format!("{HEADER}{rows}")).unwrap_err();
-    let tum = |rows: &str| read_text("a.tum", rows).unwrap_err();
+    let said = |name: &str, text: &str| {
+        let error = read_text(name, text).unwrap_err();
+        error.strip_suffix(SKIP).map_or_else(|| format!("{error} (no remedy)"), str::to_owned)
+    };
+    let csv = |rows: &str| said("a.csv", &format!("{HEADER}{rows}"));
+    let tum = |rows: &str| said("a.tum", rows);
     assert_eq!(csv("0,a,0,0,x,0,0,0,1\n"), "a.csv:2: `pz` is `x`, expected a number");
     assert_eq!(csv("0,a,0,0,nan,0,0,0,1\n"), "a.csv:2: `pz` is `nan`, expected a finite number");
+    assert_eq!(csv("0,a,0,0,,0,0,0,1\n"), "a.csv:2: `pz` is empty");
     assert_eq!(csv("0,a,0,0,0,0,0,0,1\n0.1,a,0,0,0\n"), "a.csv:3: 5 columns, expected 9");
-    assert_eq!(csv("0,a,0,0,0,0,0,0,1\n0,a,0,0,0,0,0,0,1\n"), "a.csv:3: a second pose of the same tool at 0 s");
-    assert_eq!(csv("1,a,0,0,0,0,0,0,1\n0,b,0,0,0,0,0,0,1\n"), "a.csv:3: time 0 s is before the line above it (1 s)");
+    assert_eq!(
+        csv("0,a,0,0,0,0,0,0,1\n0,a,0,0,0,0,0,0,1\n"),
+        "a.csv:3: a second pose of the same tool at 0, as in line 2"
+    );
+    assert_eq!(csv("1,a,0,0,0,0,0,0,1\n0,b,0,0,0,0,0,0,1\n"), "a.csv:3: time 0 is before that of line 2 (1)");
     assert_eq!(csv("0,a,0,0,0,0,0,0,2\n"), "a.csv:2: orientation has length 2, expected 1 within 0.01");
     assert_eq!(csv("0,a,2000,0,0,0,0,0,1\n"), "a.csv:2: `position` is 2000, at most 1000 is accepted");
     assert!(csv("0,a/b,0,0,0,0,0,0,1\n").starts_with("a.csv:2: `a/b` is not a name"));
-    assert_eq!(csv(""), "a.csv: the file has no poses");
-    assert!(read_text("a.csv", "t,x\n").unwrap_err().starts_with("a.csv:1: the header must be `time_s,tool,px"));
     assert_eq!(tum("0 1 2 3\n"), "a.tum:1: 4 columns, expected `timestamp tx ty tz qx qy qz qw`");
     assert_eq!(tum("# x\n0 1 2 3 0 0 0 one\n"), "a.tum:2: `qw` is `one`, expected a number");
-    assert_eq!(tum(""), "a.tum: the file has no poses");
-    assert!(read("no/such/file.csv", gate).unwrap_err().to_string().starts_with("no/such/file.csv: "));
+    for empty in ["", HEADER] {
+        assert_eq!(read_text("a.csv", empty).unwrap_err(), "a.csv: the file has no poses");
+    }
+    assert_eq!(read_text("a.tum", "# nothing\n\n").unwrap_err(), "a.tum: the file has no poses");
+    assert!(read_text("a.csv", "t,x\n").unwrap_err().starts_with("a.csv:1: the header must be `time_s,tool,px"));
+    let error = read("no/such/file.csv", ReadOptions::default(), gate).unwrap_err();
+    assert!(error.to_string().starts_with("no/such/file.csv: "));
 }
 
 #[test]
 fn a_file_that_is_no_text() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("a.tum");
-    std::fs::write(&path, b"0 0 0 0 0 0 0 1\n\xff\xfe\n").unwrap();
-    assert!(read(&path, gate).unwrap_err().to_string().ends_with("a.tum:2: not text"));
+    let said = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        read(&path, ReadOptions::default(), gate).unwrap_err().to_string()
+    };
+    assert!(said(b"0 0 0 0 0 0 0 1\n\xff\xfe\n").ends_with("a.tum:2: not text"));
+    assert!(said(b"\xff\xfe0\0 \0").ends_with("a.tum:1: the file is UTF-16; save it as UTF-8"));
 }
 
 fn at(positions_m: &[[f64; 3]]) -> Vec<TrackedPose> {

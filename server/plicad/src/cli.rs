@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use plica_daemon::bus::BusOptions;
 use plica_jobs::{Keep, Priority};
 use plica_protocol::{DEFAULT_ENDPOINT, DEFAULT_SESSION};
+use plica_trajectory::{OnBadRow, QuaternionOrder, ReadOptions, TimeUnit};
 
 /// Simulates a soft object that tools touch, at 1 kHz, and serves it on a Zenoh bus.
 #[derive(Debug, Parser)]
@@ -174,14 +175,88 @@ pub struct ChildArgs {
     pub command: Vec<OsString>,
 }
 
+/// How a pose file is read: docs/poses.md.
+#[derive(Debug, Args)]
+pub struct PoseFileArgs {
+    /// Unit of the file's times [default: recognised by a plausible rate]
+    #[arg(long, value_enum, value_name = "UNIT")]
+    pub time_unit: Option<TimeUnitName>,
+    /// Order of quaternion components in the file [default: xyzw, or as the header names them]
+    #[arg(long, value_enum, value_name = "ORDER")]
+    pub quaternion_order: Option<QuaternionOrderName>,
+    /// Rows that cannot be played (NaN, tool out of sight, times that repeat or go back) refuse the file, or are left out and counted.
+    #[arg(long, value_enum, default_value_t, value_name = "POLICY")]
+    pub on_bad_row: OnBadRowName,
+}
+
+/// Units of time by name.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum TimeUnitName {
+    /// Seconds.
+    S,
+    /// Milliseconds.
+    Ms,
+    /// Microseconds.
+    Us,
+    /// Nanoseconds.
+    Ns,
+}
+
+/// Orders of quaternion components by name.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum QuaternionOrderName {
+    /// w last.
+    Xyzw,
+    /// w first.
+    Wxyz,
+}
+
+/// Policies for rows that cannot be played.
+#[derive(Debug, Clone, Copy, Default, ValueEnum)]
+pub enum OnBadRowName {
+    /// The file is refused, with the line.
+    #[default]
+    Error,
+    /// They are left out and counted; the tool stays where it was.
+    Skip,
+}
+
+impl PoseFileArgs {
+    /// The same as options of the reader.
+    pub fn options(&self) -> ReadOptions {
+        ReadOptions {
+            time_unit: self.time_unit.map(|unit| match unit {
+                TimeUnitName::S => TimeUnit::Seconds,
+                TimeUnitName::Ms => TimeUnit::Milliseconds,
+                TimeUnitName::Us => TimeUnit::Microseconds,
+                TimeUnitName::Ns => TimeUnit::Nanoseconds,
+            }),
+            quaternion_order: self.quaternion_order.map(|order| match order {
+                QuaternionOrderName::Xyzw => QuaternionOrder::Xyzw,
+                QuaternionOrderName::Wxyz => QuaternionOrder::Wxyz,
+            }),
+            on_bad_row: match self.on_bad_row {
+                OnBadRowName::Error => OnBadRow::Error,
+                OnBadRowName::Skip => OnBadRow::Skip,
+            },
+        }
+    }
+}
+
 /// `plicad simulate`.
 #[derive(Debug, Args)]
 pub struct SimulateArgs {
     /// Scene file, or `wedge` for the built-in one.
     pub scene: PathBuf,
-    /// Poses: CSV (time_s,tool,px,py,pz,qx,qy,qz,qw) or a TUM trajectory.
+    /// Poses: CSV (time_s,tool,px,py,pz,qx,qy,qz,qw) or a TUM trajectory; the first one plays at 0.
     #[arg(long, value_name = "FILE")]
     pub poses: PathBuf,
+    /// How the file is read.
+    #[command(flatten)]
+    pub reading: PoseFileArgs,
+    /// Runs even if it writes more than the disk has free, or takes hours.
+    #[arg(long)]
+    pub no_limits: bool,
     /// Result, a safetensors file.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
@@ -343,9 +418,12 @@ pub struct DemoArgs {
     /// Seconds of the scripted motion.
     #[arg(long, default_value_t = 8.0)]
     pub seconds: f64,
-    /// Poses to play in place of the scripted motion: CSV or TUM.
+    /// Poses to play in place of the scripted motion, in real time: CSV or TUM.
     #[arg(long, value_name = "FILE")]
     pub poses: Option<PathBuf>,
+    /// How the file is read.
+    #[command(flatten)]
+    pub reading: PoseFileArgs,
     /// Maps the trajectory's box into the workspace above the object.
     #[arg(long, requires = "poses")]
     pub fit: bool,

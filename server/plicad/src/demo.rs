@@ -21,7 +21,7 @@ use plica_geometry::DisplaySurface;
 use plica_scene::Config;
 
 pub use held_out::{Distance, Errors};
-pub use path::{Path as DemoPath, from_file, scripted};
+pub use path::{Path as DemoPath, from_poses, scripted};
 use summary::{Files, Played, summarise};
 pub use summary::{Percentiles, Summary, Trained};
 use witness::{Seen, Witness};

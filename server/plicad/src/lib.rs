@@ -8,4 +8,7 @@ pub mod frames_file;
 pub mod logging;
 pub mod picture;
 pub mod roofline;
+pub mod run_cost;
+pub mod sampling_cost;
 mod service;
+pub mod work;

@@ -7,7 +7,9 @@
 mod checks;
 mod document;
 mod error;
+mod motion_start;
 mod ranges;
+mod timed_pose;
 
 pub mod case;
 pub mod extents;

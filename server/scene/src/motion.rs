@@ -4,11 +4,13 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use plica_geometry::DisplaySurface;
-use plica_sim::{PoseSample, ToolDescription, ToolShape};
-use plica_trajectory::{self as trajectory, Fit, Terrain, TrackedPose, TrajectoryError};
+use plica_sim::{PoseSample, ToolDescription, ToolShape, world_from_tool};
+use plica_trajectory::{self as trajectory, Fit, MotionReport, ReadOptions, Terrain, TrackedPose, TrajectoryError};
 
 use crate::model;
+use crate::motion_start;
 use crate::scene::{Config, MeshConfig};
+pub use crate::timed_pose::TimedPose;
 
 /// Why recorded poses cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +27,17 @@ pub enum MotionError {
         tool: String,
         /// The scene's tools.
         known: String,
+    },
+    /// A tool that starts upside down, and upright with the components of its quaternion in another order.
+    #[error(
+        "{file}: `{tool}` starts upside down; it starts upright if `w` comes first in the file: say --quaternion-order wxyz \
+         if it does, --quaternion-order xyzw if the tool is meant to hang (in a scene: quaternion_order)"
+    )]
+    WhichQuaternionOrder {
+        /// The pose file.
+        file: String,
+        /// The tool.
+        tool: String,
     },
     /// The file names no tool, and the scene has several.
     #[error("{file} names no tool, and the scene has {known}; choose one with --tool")]
@@ -46,62 +59,89 @@ impl MotionError {
             }
             Self::Trajectory(TrajectoryError::Io { path, .. }) => format!("{}: cannot be read", name(path)),
             Self::Trajectory(TrajectoryError::Empty { path }) => format!("{}: the file has no poses", name(path)),
+            Self::Trajectory(TrajectoryError::TimeUnit { path, .. }) => {
+                format!("{}: the unit of its times cannot be told; give time_unit", name(path))
+            }
             Self::UnknownTool { file, known, .. } => {
                 format!("{}: names a tool that the scene does not have; it has: {known}", name(Path::new(file)))
             }
             Self::WhichTool { file, known } => {
                 format!("{}: names no tool, and the scene has {known}", name(Path::new(file)))
             }
+            Self::WhichQuaternionOrder { file, tool } => {
+                format!("{}: `{tool}` starts upside down; give quaternion_order", name(Path::new(file)))
+            }
             Self::Trajectory(_) => "the recorded motion cannot be used".to_owned(),
         }
     }
 }
 
-/// A pose and its time of arrival.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TimedPose {
-    /// Time \[s\].
-    pub time_s: f64,
-    /// Index of the tool.
-    pub tool: usize,
-    /// The pose, numbered from 1 on for each tool.
-    pub sample: PoseSample,
+/// How recorded poses are read.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct MotionOptions<'a> {
+    /// Tool of poses that name none.
+    pub tool: Option<&'a str>,
+    /// Maps the motion's box into the room above the object.
+    pub fit: bool,
+    /// How the file is read.
+    pub read: ReadOptions,
 }
 
-/// Reads poses for a scene, in order of time; with `fit` also the map of the fit.
-pub fn read(
-    file: &Path,
-    config: &Config,
-    default_tool: Option<&str>,
-    fit: bool,
-) -> Result<(Vec<TimedPose>, Option<Fit>), MotionError> {
-    let mut tracked = trajectory::read(file, plica_protocol::pose::gate)?;
-    let default_tool = which_tool(file, config, &tracked, default_tool)?;
-    let fitted = if fit { Some(fit_onto(config, default_tool, &mut tracked)?) } else { None };
+/// Recorded poses for a scene.
+#[derive(Debug, Clone)]
+pub struct Motion {
+    /// In order of time.
+    pub poses: Vec<TimedPose>,
+    /// What the fit did, if it was asked for.
+    pub fit: Option<Fit>,
+    /// What the file held.
+    pub report: MotionReport,
+    /// Sentences on a motion that is likely not meant: far from the object, inside of it, upside down.
+    pub remarks: Vec<String>,
+}
+
+/// Reads poses for a scene. Bounds of positions hold after the tool's `position_scale`.
+pub fn read(file: &Path, config: &Config, options: MotionOptions<'_>) -> Result<Motion, MotionError> {
+    let scale = |tool: Option<&str>| {
+        let tool = tool.or(options.tool).map_or(Some(0), |name| config.tool_index(name));
+        tool.and_then(|tool| config.tools().get(tool)).map_or(1.0, |tool| tool.position_scale)
+    };
+    let gate = |tool: Option<&str>, position: [f64; 3], orientation_xyzw| {
+        plica_protocol::pose::gate(tool, position.map(|c| scale(tool) * c), orientation_xyzw)
+    };
+    let trajectory::Trajectory { poses: mut tracked, report } = trajectory::read(file, options.read, gate)?;
+    let default_tool = which_tool(file, config, &tracked, options.tool)?;
+    let fit = if options.fit { Some(fit_onto(file, config, default_tool, &mut tracked)?) } else { None };
     let mut sequences = vec![0; config.tools().len()];
     let mut poses = Vec::with_capacity(tracked.len());
     for t in &tracked {
-        let tool = match &t.tool {
-            Some(name) => config.tool_index(name).ok_or_else(|| unknown_tool(file, config, name))?,
-            None => default_tool,
-        };
+        let tool = tool_of(file, config, default_tool, t)?;
         sequences[tool] += 1;
         poses.push(TimedPose { time_s: t.time_s, tool, sample: sample(t, sequences[tool]) });
     }
-    Ok((poses, fitted))
+    let may_ask = report.quaternion_order_assumed && fit.is_none();
+    if let Some(tool) = motion_start::tool_with_w_first(config, &poses).filter(|_| may_ask) {
+        let tool = config.tools()[tool].name.clone();
+        return Err(MotionError::WhichQuaternionOrder { file: file.display().to_string(), tool });
+    }
+    let remarks = motion_start::remarks(config, &poses, fit.is_some());
+    Ok(Motion { poses, fit, report, remarks })
+}
+
+/// Index of the tool that a pose is for.
+fn tool_of(file: &Path, config: &Config, default_tool: usize, pose: &TrackedPose) -> Result<usize, MotionError> {
+    let Some(name) = &pose.tool else { return Ok(default_tool) };
+    config.tool_index(name).ok_or_else(|| unknown_tool(file, config, name))
 }
 
 fn sample(tracked: &TrackedPose, sequence: u64) -> PoseSample {
-    let [x, y, z, w] = tracked.orientation_xyzw;
-    // The gate has normalised the quaternion; a second normalisation would change bits.
-    let rotation = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
     let source_time_ns = (tracked.time_s.max(0.0) * 1e9).round() as u64;
     PoseSample {
         sequence,
         // As on the bus: 0 is an unknown time.
         source_time_ns: (source_time_ns != 0).then_some(source_time_ns),
         valid: true,
-        pose: Isometry3::from_parts(Translation3::from(tracked.position_m), rotation),
+        pose: isometry(tracked),
     }
 }
 
@@ -127,12 +167,54 @@ fn known(config: &Config) -> String {
     if names.is_empty() { "no tools".into() } else { names.join(", ") }
 }
 
-/// Fits a motion onto the object's skin, as `plica probe --fit` does with the mesh of the daemon.
-fn fit_onto(config: &Config, tool: usize, tracked: &mut [TrackedPose]) -> Result<Fit, TrajectoryError> {
+/// Fits a motion onto the object's skin, as `plica probe --fit` does with the mesh that it is given. The tool is what is
+/// fitted, wherever its marker and its tracker are.
+fn fit_onto(
+    file: &Path,
+    config: &Config,
+    default_tool: usize,
+    tracked: &mut [TrackedPose],
+) -> Result<Fit, MotionError> {
     let surface = DisplaySurface::new(&model::skin(config));
     let terrain = Terrain::new(&surface.rest, &surface.triangles).expect("a closed skin has triangles");
-    let tip_radius_m = config.tools().get(tool).map_or(0.0, tip_radius_m);
-    trajectory::fit_above(tracked, &terrain, tip_radius_m, trajectory::fitted_depth_m(&terrain))
+    let tip_radius_m = config.tools().get(default_tool).map_or(0.0, tip_radius_m);
+    let tools = tracked.iter().map(|t| tool_of(file, config, default_tool, t)).collect::<Result<Vec<_>, _>>()?;
+    let each = |tracked: &mut [TrackedPose], map: &dyn Fn(&ToolDescription, &Isometry3<f64>) -> Isometry3<f64>| {
+        for (pose, tool) in tracked.iter_mut().zip(&tools) {
+            if let Some(tool) = config.tools().get(*tool).filter(|tool| !is_in_world(tool)) {
+                set_pose(pose, &map(tool, &isometry(pose)));
+            }
+        }
+    };
+    each(tracked, &world_from_tool);
+    let fit = trajectory::fit_above(tracked, &terrain, tip_radius_m, trajectory::fitted_depth_m(&terrain))?;
+    each(tracked, &tracker_from_marker);
+    Ok(fit)
+}
+
+/// Whether a tool is tracked at its own origin, in the world and in metres.
+fn is_in_world(tool: &ToolDescription) -> bool {
+    let identity = Isometry3::identity();
+    tool.world_from_tracker == identity && tool.tool_from_marker == identity && tool.position_scale == 1.0
+}
+
+/// The tracked pose that puts a tool at a pose in the world: [`world_from_tool`] undone.
+fn tracker_from_marker(tool: &ToolDescription, world_from_tool: &Isometry3<f64>) -> Isometry3<f64> {
+    let mut pose = tool.world_from_tracker.inverse() * world_from_tool * tool.tool_from_marker;
+    pose.translation.vector /= tool.position_scale;
+    pose
+}
+
+fn isometry(tracked: &TrackedPose) -> Isometry3<f64> {
+    let [x, y, z, w] = tracked.orientation_xyzw;
+    // The gate has normalised the quaternion; a second normalisation would change bits.
+    let rotation = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
+    Isometry3::from_parts(Translation3::from(tracked.position_m), rotation)
+}
+
+fn set_pose(tracked: &mut TrackedPose, pose: &Isometry3<f64>) {
+    let q = pose.rotation.quaternion();
+    (tracked.position_m, tracked.orientation_xyzw) = (pose.translation.vector.into(), [q.i, q.j, q.k, q.w]);
 }
 
 /// Height of the object's top above z = 0 at `x` \[m\].
@@ -160,6 +242,12 @@ mod tests {
 
     use super::*;
 
+    const FIT: MotionOptions<'_> = MotionOptions {
+        tool: None,
+        fit: true,
+        read: ReadOptions { time_unit: None, quaternion_order: None, on_bad_row: trajectory::OnBadRow::Error },
+    };
+
     fn write(name: &str, text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(name);
@@ -172,7 +260,7 @@ mod tests {
         let config = Config::built_in().unwrap();
         let (_folder, path) =
             write("flat.tum", "0 0 0 1 0 0 0 1\n1 4 0 1 0 0 0 1\n2 4 1 1.1 0 0 0 1\n3 0 1 1.2 0 0 0 1\n");
-        let (poses, fit) = read(&path, &config, None, true).unwrap();
+        let Motion { poses, fit, .. } = read(&path, &config, FIT).unwrap();
         assert!(fit.is_some());
         let height =
             |p: &TimedPose| p.sample.pose.translation.z - 0.007 - top_height_m(&config, p.sample.pose.translation.x);
@@ -187,11 +275,47 @@ mod tests {
         let config = Config::built_in().unwrap();
         let header = "time_s,tool,px,py,pz,qx,qy,qz,qw\n";
         let (_folder, path) = write("a.csv", &format!("{header}0,probe,0,0,0.1,0,0,0,1\n0.5,,0,0,0.2,0,0,0,1\n"));
-        let (poses, _) = read(&path, &config, None, false).unwrap();
+        let poses = read(&path, &config, MotionOptions::default()).unwrap().poses;
         assert_eq!(poses.iter().map(|p| p.sample.sequence).collect::<Vec<_>>(), [1, 2]);
         assert_eq!(poses[1].sample.source_time_ns, Some(500_000_000));
         let (_folder, path) = write("b.csv", &format!("{header}0,drill,0,0,0.1,0,0,0,1\n"));
-        let message = read(&path, &config, None, false).unwrap_err().to_string();
+        let message = read(&path, &config, MotionOptions::default()).unwrap_err().to_string();
         assert!(message.contains("`drill`") && message.contains("probe"), "{message}");
+    }
+
+    /// The wedge with its probe tracked otherwise.
+    fn tracked_by(keys: &str) -> Config {
+        let plain = "position_scale = 1.0           # 1e-4 to 1e4: factor on tracked positions";
+        let scene = crate::BUILT_IN_SCENE.replace("world_from_tracker = {", "# world_from_tracker = {");
+        assert!(scene.contains(plain));
+        Config::parse(std::path::Path::new("wedge.toml"), &scene.replace(plain, keys)).unwrap()
+    }
+
+    #[test]
+    fn positions_in_millimetres_are_in_bounds_after_position_scale() {
+        let far = "0 1500 30 40 0 0 0 1\n0.01 1500 30 40 0 0 0 1\n";
+        let (_folder, path) = write("mm.tum", far);
+        let scaled = tracked_by("position_scale = 0.001");
+        assert_eq!(read(&path, &scaled, MotionOptions::default()).unwrap().poses.len(), 2);
+        let message = read(&path, &Config::built_in().unwrap(), MotionOptions::default()).unwrap_err().to_string();
+        assert!(message.contains("`position` is 150") && message.contains("at most 1000"), "{message}");
+    }
+
+    #[test]
+    fn a_fit_puts_the_tool_above_the_object_wherever_its_tracker_is() {
+        let text = "0 0 0 1 0 0 0 1\n1 4 0 1 0 0 0 1\n2 4 1 1.1 0 0 0 1\n3 0 1 1.2 0 0.6 0 0.8\n";
+        let (_folder, path) = write("flat.tum", text);
+        let world = |config: &Config| -> Vec<Isometry3<f64>> {
+            let poses = read(&path, config, FIT).unwrap().poses;
+            poses.iter().map(|p| world_from_tool(&config.tools()[0], &p.sample.pose)).collect()
+        };
+        let plain = world(&Config::built_in().unwrap());
+        let scaled = world(&tracked_by("position_scale = 0.001"));
+        let moved =
+            world(&tracked_by("world_from_tracker = { translation_m = [0.1, -0.2, 0.3] }\nposition_scale = 0.5"));
+        for (plain, other) in plain.iter().zip(scaled.iter().zip(&moved)).flat_map(|(p, (a, b))| [(p, a), (p, b)]) {
+            assert!((plain.translation.vector - other.translation.vector).norm() < 1e-9, "{plain} {other}");
+            assert!(plain.rotation.angle_to(&other.rotation) < 1e-7);
+        }
     }
 }

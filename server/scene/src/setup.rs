@@ -7,7 +7,7 @@ use plica_training::{IN_REGION, InteractionSet, RecordedPose, Setup, Source};
 
 use crate::hash::{HashError, scene_hash};
 use crate::model::{self, SceneModelError};
-use crate::motion::{self, MotionError};
+use crate::motion::{self, MotionError, MotionOptions};
 use crate::scene::{Config, TrainingConfig};
 
 /// Why a scene cannot be trained.
@@ -88,12 +88,13 @@ fn source(config: &Config, training: &TrainingConfig, tool: usize) -> Result<Sou
     let Some(recorded) = &training.recorded else { return Ok(Source::Press(training.ranges.clone())) };
     let path = config.file().parent().unwrap_or(Path::new("")).join(&recorded.file);
     let name = config.tools()[tool].name.clone();
-    let (poses, _) = motion::read(&path, config, Some(&name), recorded.fit)
+    let options = MotionOptions { tool: Some(&name), fit: recorded.fit, read: recorded.read };
+    let poses = motion::read(&path, config, options)
         .map_err(|cause| SetupError::Motion { object: config.object().name().to_owned(), cause })?;
     let pose = |timed: &motion::TimedPose| RecordedPose {
         time_s: timed.time_s,
         tool: timed.tool,
         pose: world_from_tool(&config.tools()[timed.tool], &timed.sample.pose),
     };
-    Ok(Source::Recorded(poses.iter().map(pose).collect()))
+    Ok(Source::Recorded(poses.poses.iter().map(pose).collect()))
 }

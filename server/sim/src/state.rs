@@ -53,7 +53,7 @@ impl State {
             quaternions: vec![IDENTITY; model.elements.n_batches()],
             skin: SkinPositions::at_rest(&model.embedding),
             contacts: Vec::with_capacity(n_contacts),
-            tracks: vec![PoseTrack::new(); n_tools],
+            tracks: model.description.tools.iter().map(PoseTrack::new).collect(),
             proxies: vec![Proxy::absent(); n_tools],
             readings: vec![absent_reading(); n_tools],
             quiet_s: 0.0,

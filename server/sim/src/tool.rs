@@ -3,6 +3,8 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::description::{Sampling, ToolDescription};
+use crate::pose_ring::{PoseRing, ReceivedPose};
+use crate::source_clock::{Observed, SourceClock};
 
 /// A device pose as the tracker reported it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,29 +28,13 @@ pub struct ToolPose {
     pub sample: PoseSample,
 }
 
-/// Samples kept per tool.
-const RING: usize = 16;
-
-/// A sample in world coordinates with its arrival.
-#[derive(Debug, Clone, Copy)]
-struct ReceivedPose {
-    /// Counts samples, from 1.
-    number: u64,
-    arrival_s: f64,
-    /// Time on the source's clock, if known.
-    source_s: Option<f64>,
-    world_from_tool: Isometry3<f64>,
-    /// Motion from the previous sample exceeds the speed limit: the tool is re-placed.
-    is_jump: bool,
-}
-
 /// The pose ring of one tool and the target that its proxy follows.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(crate) struct PoseTrack {
-    ring: [Option<ReceivedPose>; RING],
-    newest: usize,
-    /// Smallest `arrival - source time` seen \[s\].
-    clock_offset_s: f64,
+    ring: PoseRing,
+    clock: SourceClock,
+    /// Source time that counts as 0, so that none loses digits \[ns\].
+    source_origin_ns: Option<u64>,
     target: Option<Target>,
     pub(crate) sequence: u64,
     pub(crate) source_time_ns: u64,
@@ -68,11 +54,11 @@ pub(crate) struct Target {
 }
 
 impl PoseTrack {
-    pub(crate) fn new() -> Self {
+    pub(crate) fn new(tool: &ToolDescription) -> Self {
         Self {
-            ring: [None; RING],
-            newest: 0,
-            clock_offset_s: f64::INFINITY,
+            ring: PoseRing::new(delay_s(tool)),
+            clock: SourceClock::new(),
+            source_origin_ns: None,
             target: None,
             sequence: 0,
             source_time_ns: 0,
@@ -89,24 +75,24 @@ impl PoseTrack {
         if !sample.valid {
             return true;
         }
-        let source_s = sample.source_time_ns.map(|ns| ns as f64 * 1e-9);
         let mut received = ReceivedPose {
-            number: 1,
+            number: 0,
             arrival_s: clock_s,
-            source_s,
+            source_s: sample.source_time_ns.map(|ns| self.since_origin_s(ns)),
             world_from_tool: world_from_tool(tool, &sample.pose),
             is_jump: false,
         };
-        if let Some(last) = self.ring[self.newest] {
-            received.number = last.number + 1;
+        if let Some(last) = self.ring.newest().copied() {
             received.is_jump = is_jump(&last, &received, tool.max_tool_speed_m_per_s);
-            if source_s.zip(last.source_s).is_some_and(|(now, before)| now < before) {
+            if received.source_s.zip(last.source_s).is_some_and(|(now, before)| now < before) {
                 self.forget_source();
+                received.source_s = sample.source_time_ns.map(|ns| self.since_origin_s(ns));
             }
         }
-        self.newest = (self.newest + 1) % RING;
-        self.ring[self.newest] = Some(received);
-        self.clock_offset_s = source_s.map_or(f64::INFINITY, |s| clock_s - s).min(self.clock_offset_s);
+        if delay_s(tool).is_some() {
+            self.follow_clock(&received);
+        }
+        self.ring.push(received, self.reached);
         self.sequence = sample.sequence;
         self.source_time_ns = sample.source_time_ns.unwrap_or(0);
         true
@@ -114,17 +100,18 @@ impl PoseTrack {
 
     /// Age of the newest sample \[s\]; infinite if there was none.
     pub(crate) fn age_s(&self, clock_s: f64) -> f64 {
-        self.ring[self.newest].map_or(f64::INFINITY, |a| clock_s - a.arrival_s)
+        self.ring.newest().map_or(f64::INFINITY, |a| clock_s - a.arrival_s)
     }
 
     /// Moves the target on by one tick of `dt` seconds; `None` before the first sample.
     pub(crate) fn advance(&mut self, tool: &ToolDescription, clock_s: f64, dt: f64) -> Option<Target> {
+        self.clock.advance(clock_s, dt);
         let (wanted, reached) = match tool.sampling {
-            Sampling::Latest => self.ring[self.newest].map(|s| (s.world_from_tool, s.number))?,
+            Sampling::Latest => self.ring.newest().map(|s| (s.world_from_tool, s.number))?,
             Sampling::Interpolate { delay_s } => self.interpolate(clock_s - delay_s)?,
         };
         let target = match self.target {
-            Some(last) if !self.jumps_before(reached) => {
+            Some(last) if !self.ring.has_jump(self.reached, reached) => {
                 let max_distance = tool.max_tool_speed_m_per_s * dt;
                 Target { pose: towards(&last.pose, &wanted, max_distance), before: last.pose, placed: false }
             }
@@ -138,40 +125,66 @@ impl PoseTrack {
         self.target
     }
 
-    /// Whether a jump lies between the samples reached so far and sample `number`.
-    fn jumps_before(&self, number: u64) -> bool {
-        self.ring.iter().flatten().any(|s| s.is_jump && s.number > self.reached && s.number <= number)
+    /// A source's time since the first one of its clock \[s\].
+    fn since_origin_s(&mut self, ns: u64) -> f64 {
+        let origin_ns = *self.source_origin_ns.get_or_insert(ns);
+        (i128::from(ns) - i128::from(origin_ns)) as f64 * 1e-9
+    }
+
+    /// Tells the source's clock; samples of a clock that was set anew are no neighbours of earlier ones.
+    fn follow_clock(&mut self, received: &ReceivedPose) {
+        let Some(source_s) = received.source_s else { return };
+        if self.clock.observe(received.arrival_s, source_s) == Observed::ClockWasSet {
+            self.ring.clear();
+        }
     }
 
     /// Drops all samples: the source's clock went back, so it restarted.
     fn forget_source(&mut self) {
-        self.ring = [None; RING];
-        self.clock_offset_s = f64::INFINITY;
+        self.ring.clear();
+        self.clock = SourceClock::new();
+        self.source_origin_ns = None;
     }
 
     /// Pose at `time_s` on the caller's clock, from the two samples around it, and the number of the earlier one; held at
     /// either end of the ring, and before a jump.
     fn interpolate(&self, time_s: f64) -> Option<(Isometry3<f64>, u64)> {
-        let mut after: Option<ReceivedPose> = None;
-        for back in 0..RING {
-            let Some(sample) = self.ring[(self.newest + RING - back) % RING] else { break };
-            let at_s = self.clock_time_s(&sample);
-            if at_s <= time_s {
-                let next = after.filter(|a| !a.is_jump);
-                let share = |next: &ReceivedPose| (time_s - at_s) / (self.clock_time_s(next) - at_s).max(1e-9);
-                let pose = next.map_or(sample.world_from_tool, |next| {
-                    blend(&sample.world_from_tool, &next.world_from_tool, share(&next).clamp(0.0, 1.0))
-                });
-                return Some((pose, sample.number));
-            }
-            after = Some(sample);
-        }
-        after.map(|a| (a.world_from_tool, a.number))
+        let [before, after] = self.ring.around(time_s, |sample| self.clock_time_s(sample));
+        let Some(before) = before else { return after.map(|a| (a.world_from_tool, a.number)) };
+        let at_s = self.clock_time_s(before);
+        let share = |next: &ReceivedPose| (time_s - at_s) / (self.clock_time_s(next) - at_s).max(1e-9);
+        let pose = after.filter(|a| !a.is_jump).map_or(before.world_from_tool, |next| {
+            blend(&before.world_from_tool, &next.world_from_tool, share(next).clamp(0.0, 1.0))
+        });
+        Some((pose, before.number))
     }
 
-    /// Time of a sample on the caller's clock: its source's time shifted by the smallest latency seen \[s\].
+    /// When a sample was taken, on the caller's clock: its source's time shifted by the offset that is followed \[s\].
     fn clock_time_s(&self, sample: &ReceivedPose) -> f64 {
-        sample.source_s.map_or(sample.arrival_s, |s| s + self.clock_offset_s)
+        sample.source_s.map_or(sample.arrival_s, |s| s + self.clock.offset_s())
+    }
+}
+
+impl Clone for PoseTrack {
+    fn clone(&self) -> Self {
+        Self { ring: self.ring.clone(), clock: self.clock.clone(), ..*self }
+    }
+
+    /// Without allocating, for tracks of one tool.
+    fn clone_from(&mut self, other: &Self) {
+        let Self { ring, clock, source_origin_ns, target, sequence, source_time_ns, placements, reached } = other;
+        self.ring.clone_from(ring);
+        self.clock.clone_from(clock);
+        (self.source_origin_ns, self.target, self.sequence) = (*source_origin_ns, *target, *sequence);
+        (self.source_time_ns, self.placements, self.reached) = (*source_time_ns, *placements, *reached);
+    }
+}
+
+/// How far in the past a tool is played; none for the newest pose.
+fn delay_s(tool: &ToolDescription) -> Option<f64> {
+    match tool.sampling {
+        Sampling::Latest => None,
+        Sampling::Interpolate { delay_s } => Some(delay_s),
     }
 }
 
@@ -210,3 +223,6 @@ fn is_finite(pose: &Isometry3<f64>) -> bool {
     let rotation: &UnitQuaternion<f64> = &pose.rotation;
     translation.iter().chain(rotation.coords.iter()).all(|c| c.is_finite())
 }
+
+#[cfg(test)]
+mod tests;

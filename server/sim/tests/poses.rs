@@ -220,11 +220,13 @@ fn interpolation_moves_and_turns_between_two_samples() {
 }
 
 #[test]
-fn ring_holds_sixteen_samples() {
-    let mut run = scene(|t| t.sampling = Sampling::Interpolate { delay_s: 1.0 });
-    let samples: Vec<PoseSample> = (0..20).map(|k| sample(0.01 * f64::from(k), along(1e-3 * f64::from(k)))).collect();
+fn ring_reaches_back_by_the_delay_and_a_tenth_of_a_second() {
+    let mut run = scene(|t| t.sampling = Sampling::Interpolate { delay_s: 0.3 });
+    let samples: Vec<PoseSample> =
+        (0..2000).map(|k| sample(1.0 + 1e-3 * f64::from(k), along(1e-4 * f64::from(k)))).collect();
     tick_with(&mut run, &samples);
-    assert!((x(&run) - 4e-3).abs() < 1e-12, "the oldest of the last 16 is 4, the tool is at {}", x(&run));
+    // All arrive at once: the newest has the least latency, and 0.3 s before it lies sample 1699.
+    assert!((x(&run) - 0.1699).abs() < 1e-9, "the tool is at {}", x(&run));
 }
 
 /// Two sides of the object, seen at 250 Hz: no sweep between them.

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use plica_protocol::ENCODING_JSON;
+use plica_protocol::ENCODING_BYTES;
+use plica_protocol::encoding::is_json;
 use plica_protocol::pose::Pose;
 use zenoh::Wait;
 use zenoh::bytes::Encoding;
@@ -14,14 +15,14 @@ use super::guard::guarded;
 use super::shared::Shared;
 
 pub(super) fn declare(shared: &Arc<Shared>) -> Result<Subscriber<()>, BusError> {
-    let json = Encoding::from(ENCODING_JSON);
+    let binary = Encoding::from(ENCODING_BYTES);
     let receiver = Arc::clone(shared);
-    let callback = guarded(&shared.counters, move |sample: Sample| receive(&receiver, &json, &sample));
+    let callback = guarded(&shared.counters, move |sample: Sample| receive(&receiver, &binary, &sample));
     let subscriber = shared.session.declare_subscriber(shared.keys.pose("*")).callback(callback);
     subscriber.wait().map_err(|e| shared.error(e))
 }
 
-fn receive(shared: &Shared, json: &Encoding, sample: &Sample) {
+fn receive(shared: &Shared, binary: &Encoding, sample: &Sample) {
     if sample.kind() != SampleKind::Put {
         return;
     }
@@ -31,6 +32,7 @@ fn receive(shared: &Shared, json: &Encoding, sample: &Sample) {
         return;
     };
     let bytes = sample.payload().to_bytes();
-    let is_json = sample.encoding() == json;
+    // Most poses are binary, and need no string.
+    let is_json = sample.encoding() != binary && is_json(&sample.encoding().to_string());
     shared.intake.arrive(tool, if is_json { Pose::decode_json(&bytes) } else { Pose::decode(&bytes) });
 }

@@ -305,7 +305,7 @@ fn activating_changes_the_skin_and_nothing_else() {
 fn detail_that_is_not_finite_is_left_out_of_a_degraded_frame() {
     let (mut core, mut ports) = start(true);
     let press = |sequence, z| vec![ToolPose { tool: 0, sample: sample(sequence, z) }];
-    order(&mut core, &mut ports, Command::Step { ticks: 100, poses: press(1, 0.024) }).unwrap();
+    order(&mut core, &mut ports, step(100, press(1, 0.024))).unwrap();
     let coarse = positions(&mut core, &mut ports);
     let own = live_scaled(core.model(), f32::INFINITY);
     order(&mut core, &mut ports, Command::Activate(own)).unwrap();

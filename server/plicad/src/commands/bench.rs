@@ -16,6 +16,7 @@ use serde::Serialize;
 
 use crate::cli::{BenchArgs, Element};
 use crate::roofline::Roofline;
+use crate::work::{table_bytes, work};
 
 /// What a tick does after the simulation's own stages: poses in, wrenches and frame out.
 const HAND_OVER: &str = "hand_over";
@@ -218,27 +219,6 @@ impl Timings {
             full_press_force_n,
         }
     }
-}
-
-/// Bytes of the tables that a tick reads.
-pub fn table_bytes(model: &Model) -> usize {
-    let cost = model.cost();
-    cost.product_bytes + cost.preconditioner_bytes + cost.embedding_bytes
-}
-
-/// Bytes and operations of a tick: every iteration multiplies by the stiffness and applies the preconditioner once, every
-/// pass evaluates one residual more; the skin is embedded once. Enrichment and contact rows are left out.
-pub fn work(model: &Model, iterations: f64, passes: f64) -> (f64, f64) {
-    let cost = model.cost();
-    let products = iterations + passes;
-    let bytes = products * cost.product_bytes as f64
-        + iterations * cost.preconditioner_bytes as f64
-        + cost.embedding_bytes as f64;
-    // Preconditioner and embedding do one multiply-add per 4-byte weight and component; weights are read once.
-    let flops = products * cost.product_flops as f64
-        + 0.5 * iterations * cost.preconditioner_bytes as f64
-        + 1.5 * cost.embedding_bytes as f64;
-    (bytes, flops)
 }
 
 fn spread(mut ns: Vec<u64>) -> Spread {

@@ -9,15 +9,13 @@ use plica_scene::model;
 use serde::Serialize;
 
 use crate::cli::CheckArgs;
-use crate::commands::bench::{bench, table_bytes, work};
-use crate::roofline::Roofline;
+use crate::commands::bench::bench;
+use crate::run_cost::typical_tick_s;
+use crate::sampling_cost::{SamplingCost, sampling_cost};
+use crate::work::table_bytes;
 
 /// Ticks that are timed for the estimate.
 const TRIAL_TICKS: u64 = 500;
-/// Solver iterations and passes assumed where there is no motion to try.
-const TYPICAL: (f64, f64) = (4.0, 2.0);
-/// How far a tick usually stays from its limit.
-const TYPICAL_RATIO: f64 = 3.0;
 
 /// What a scene costs.
 #[derive(Debug, Serialize)]
@@ -39,6 +37,8 @@ struct Report {
     frame_bytes: u64,
     skin_bytes_per_s: f64,
     wrench_bytes_per_s: f64,
+    /// What each tool makes of a tracker's poses.
+    poses: Vec<SamplingCost>,
     estimated_tick_us: f64,
     estimate: String,
     extents_m: [f64; 3],
@@ -68,11 +68,7 @@ fn check(config: &Config) -> anyhow::Result<Report> {
         Some(motion) => {
             (bench(config, motion, TRIAL_TICKS, TRIAL_TICKS)?.tick_us.p50, "median of a trial of the [bench] motion")
         }
-        None => {
-            let (bytes, flops) = work(&model, TYPICAL.0, TYPICAL.1);
-            let limit_s = Roofline::measure(table_bytes(&model)).limit_s(bytes, flops);
-            (1e6 * TYPICAL_RATIO * limit_s, "from bytes and operations; a [bench] table gives a better one")
-        }
+        None => (1e6 * typical_tick_s(&model), "from bytes and operations; a [bench] table gives a better one"),
     };
     let (estimated_tick_us, estimate) = match press::slowest(config, &model)? {
         Some(press) if press.tick_us > estimated_tick_us => (
@@ -99,6 +95,7 @@ fn check(config: &Config) -> anyhow::Result<Report> {
         frame_bytes,
         skin_bytes_per_s: frame_bytes as f64 * publish.publish_hz,
         wrench_bytes_per_s: plica_protocol::wrench::BYTES as f64 * publish.wrench_hz * config.tools().len() as f64,
+        poses: config.tools().iter().map(sampling_cost).collect(),
         estimated_tick_us,
         estimate,
         extents_m: config.object().mesh().extents_m(),
@@ -132,6 +129,7 @@ fn print(r: &Report) {
     println!("tables     {:.0} KiB read per tick or more often", r.table_bytes as f64 / 1024.0);
     println!("frame      {} bytes, {:.1} MB/s to each listener", r.frame_bytes, 1e-6 * r.skin_bytes_per_s);
     println!("wrenches   {:.2} MB/s to each listener", 1e-6 * r.wrench_bytes_per_s);
+    r.poses.iter().for_each(|poses| println!("poses      {poses}"));
     println!("tick       about {:.0} of {:.0} us ({})", r.estimated_tick_us, r.budget_us, r.estimate);
     if r.estimated_tick_us > 0.8 * r.budget_us {
         println!(

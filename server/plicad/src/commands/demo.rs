@@ -2,22 +2,28 @@
 
 mod examples;
 
+use std::path::Path;
+
 use plica_scene::Config;
+use plica_scene::motion::{self, MotionOptions};
 
 use crate::cli::DemoArgs;
-use crate::demo::{self, Summary};
+use crate::demo::{self, DemoPath, Summary};
+
+/// Longest motion \[s\].
+const LONGEST_S: f64 = 3600.0;
 
 /// Trains on the first run, serves on loopback, drives the tool through a real client, prints a summary, writes pictures and a
 /// GLB.
 pub fn run(args: &DemoArgs, json: bool) -> anyhow::Result<()> {
     anyhow::ensure!(
-        (1.0..=3600.0).contains(&args.seconds),
-        "--seconds {} is outside the allowed range 1 to 3600",
+        (1.0..=LONGEST_S).contains(&args.seconds),
+        "--seconds {} is outside the allowed range 1 to {LONGEST_S}",
         args.seconds
     );
     let mut config = Config::built_in()?;
     let path = match &args.poses {
-        Some(file) => demo::from_file(file, &config, args.fit)?,
+        Some(file) => recorded(file, args, &config)?,
         None => demo::scripted(&config, args.seconds),
     };
     let trained = examples::examples(&config, &args.out, args.examples)?;
@@ -28,6 +34,22 @@ pub fn run(args: &DemoArgs, json: bool) -> anyhow::Result<()> {
         println!("{}", serde_json::to_string(&summary)?);
     }
     Ok(())
+}
+
+/// The path of a pose file, and a word about it.
+fn recorded(file: &Path, args: &DemoArgs, config: &Config) -> anyhow::Result<DemoPath> {
+    let options = MotionOptions { tool: None, fit: args.fit, read: args.reading.options() };
+    let motion = motion::read(file, config, options)?;
+    motion.remarks.iter().for_each(|remark| tracing::warn!("{}: {remark}", file.display()));
+    let (seconds, unit) = (motion.report.duration_s, motion.report.time_unit.name());
+    anyhow::ensure!(
+        seconds <= LONGEST_S,
+        "{}: the motion takes {seconds:.0} s, times taken for {unit}; the demo plays in real time, {LONGEST_S} s at most; are \
+         the times in {unit}? --time-unit says it",
+        file.display()
+    );
+    println!("motion           {}", motion.report);
+    Ok(demo::from_poses(&motion.poses))
 }
 
 fn print(s: &Summary) {

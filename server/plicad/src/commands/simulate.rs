@@ -8,27 +8,28 @@ use plica_daemon::database_loader;
 use plica_daemon::replay::Replay;
 use plica_scene::Config;
 use plica_scene::model;
-use plica_scene::motion::{self, TimedPose};
+use plica_scene::motion::{self, Motion, MotionOptions};
 use plica_sim::NoProbe;
 
 use crate::cli::SimulateArgs;
 use crate::frames_file::{FramesFile, Shape};
-
-/// No simulation is meant to write more.
-const MAX_OUTPUT_BYTES: f64 = 1e12;
+use crate::run_cost::RunCost;
 
 /// Runs a scene along recorded poses and writes what came of it.
 pub fn run(args: &SimulateArgs, json: bool) -> anyhow::Result<()> {
     let config = super::scene_with(&args.scene, &args.database)?;
-    let (poses, fit) = motion::read(&args.poses, &config, args.tool.as_deref(), args.fit)?;
-    if let Some(fit) = fit {
+    let options = MotionOptions { tool: args.tool.as_deref(), fit: args.fit, read: args.reading.options() };
+    let motion = motion::read(&args.poses, &config, options)?;
+    if let Some(fit) = motion.fit {
         tracing::info!("fitted by scale {:.4}, {:?} m to {:?} m", fit.scale, fit.from_m, fit.to_m);
     }
-    let summary = simulate(&config, poses, args)?;
+    motion.remarks.iter().for_each(|remark| tracing::warn!("{}: {remark}", args.poses.display()));
+    let summary = simulate(&config, &motion, args)?;
     if json {
         println!("{summary}");
     } else {
         let (frames, ticks) = (&summary["n_frames"], &summary["n_ticks"]);
+        println!("{}: {}", args.poses.display(), motion.report);
         println!("{}: {frames} frames of {ticks} ticks", args.out.display());
         let (contact, peak) = (&summary["ticks_in_contact"], summary["peak_force_n"].as_f64().unwrap_or(0.0));
         println!("{contact} ticks in contact, peak force {peak:.3} N");
@@ -39,24 +40,21 @@ pub fn run(args: &SimulateArgs, json: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn simulate(config: &Config, poses: Vec<TimedPose>, args: &SimulateArgs) -> anyhow::Result<serde_json::Value> {
+fn simulate(config: &Config, motion: &Motion, args: &SimulateArgs) -> anyhow::Result<serde_json::Value> {
     let model = Arc::new(model::build(config)?);
-    let n_ticks = ticks_to(poses.last().map_or(0.0, |p| p.time_s), model.timestep_s());
+    let n_ticks = ticks_to(motion.report.duration_s, model.timestep_s());
     let n_frames = n_ticks / args.every;
     anyhow::ensure!(n_frames > 0, "--every {} leaves no frame of {n_ticks} ticks; choose a smaller one", args.every);
     let shape = Shape { n_frames: n_frames as usize, n_skin: model.n_skin(), n_tools: model.n_tools() };
-    let bytes = 12.0 * n_frames as f64 * shape.n_skin as f64;
-    anyhow::ensure!(
-        bytes <= MAX_OUTPUT_BYTES,
-        "{} ticks ({:.0} s) would take {:.0} GB; are the times of {} in seconds? --every N writes fewer frames",
-        n_ticks,
-        n_ticks as f64 * model.timestep_s(),
-        bytes / 1e9,
-        args.poses.display()
-    );
+    let cost = RunCost::of(&model, n_ticks, n_frames);
+    match cost.objection(&args.out, &motion.report) {
+        Some(objection) if args.no_limits => tracing::warn!("{objection}"),
+        Some(objection) => anyhow::bail!("{}: {objection}; --no-limits goes on all the same", args.poses.display()),
+        None => {}
+    }
     let enrichment = database_loader::at_start(config, &model)?;
     let mut file = FramesFile::create(&args.out, shape).with_context(|| args.out.display().to_string())?;
-    let mut replay = Replay::new(model, poses);
+    let mut replay = Replay::new(model, motion.poses.clone());
     if let Some((enrichment, ready)) = &enrichment {
         replay.enrich(enrichment.live(ready));
     }
@@ -83,6 +81,7 @@ fn simulate(config: &Config, poses: Vec<TimedPose>, args: &SimulateArgs) -> anyh
         "scene": config.name(), "out": args.out, "n_ticks": n_ticks, "n_frames": n_frames,
         "n_skin": shape.n_skin, "n_tools": shape.n_tools, "rollbacks": replay.core().state().rollbacks(),
         "ticks_in_contact": ticks_in_contact, "peak_force_n": peak_force_n, "dropped_contacts": dropped_contacts,
+        "motion": motion.report, "remarks": motion.remarks,
     }))
 }
 

@@ -85,9 +85,9 @@ fn run_job(root: &Path, threads: Option<u32>, json: bool) -> anyhow::Result<()> 
 /// The last line of a job's log goes to clients, who may have named a file that they cannot read: its words stay in the log.
 fn without_content(error: anyhow::Error) -> anyhow::Error {
     match error.downcast_ref() {
-        Some(SetupError::Motion { object, source }) => {
+        Some(SetupError::Motion { object, cause }) => {
             eprintln!("plicad: {error}");
-            anyhow::anyhow!("objects.{object}.training.recorded: {}", source.without_content())
+            anyhow::anyhow!("objects.{object}.training.recorded: {}", cause.without_content())
         }
         _ => error,
     }

@@ -2,7 +2,7 @@
 
 use plica_daemon::wire;
 use plica_scene::Config;
-use plica_scene::motion::{MotionError, TimedPose, tip_radius_m, top_height_m};
+use plica_scene::motion::{TimedPose, tip_radius_m, top_height_m};
 
 /// How deep the device goes below first touch \[m\]; the spring of the coupling takes part of it.
 const DEPTH_M: f64 = 0.012;
@@ -47,11 +47,10 @@ pub fn scripted(config: &Config, seconds: f64) -> Path {
 }
 
 /// Recorded poses of the tool that the first one is for.
-pub fn from_file(file: &std::path::Path, config: &Config, fit: bool) -> Result<Path, MotionError> {
-    let (poses, _) = plica_scene::motion::read(file, config, None, fit)?;
+pub fn from_poses(poses: &[TimedPose]) -> Path {
     let tool = poses.first().map_or(0, |p| p.tool);
     let key = |p: &TimedPose| (p.time_s, wire::position_and_xyzw(&p.sample.pose));
-    Ok(Path { tool, keys: poses.iter().filter(|p| p.tool == tool).map(key).collect(), recorded: true })
+    Path { tool, keys: poses.iter().filter(|p| p.tool == tool).map(key).collect(), recorded: true }
 }
 
 impl Path {

@@ -3,9 +3,11 @@
 use nalgebra::{Point3, Vector3};
 use plica_sim::ToolDescription;
 use plica_training::{Approach, DriveOptions, FeatureScales, PressRanges};
+use plica_trajectory::{OnBadRow, QuaternionOrder, ReadOptions, TimeUnit};
 
 use super::raw::{
-    RawAction, RawApproach, RawApproachName, RawBox, RawDrive, RawInteractionSampling, RawOutside, RawTraining,
+    RawAction, RawApproach, RawApproachName, RawBox, RawDrive, RawInteractionSampling, RawOnBadRow, RawOutside,
+    RawQuaternionOrder, RawRecorded, RawTimeUnit, RawTraining,
 };
 use crate::checks::Check;
 use crate::error::ConfigError;
@@ -49,6 +51,8 @@ pub struct RecordedConfig {
     pub file: String,
     /// Whether it is mapped into the workspace above the object.
     pub fit: bool,
+    /// How the file is read.
+    pub read: ReadOptions,
 }
 
 /// A set of interactions outside of the trained ranges.
@@ -99,7 +103,7 @@ pub(super) fn check(
             RawInteractionSampling::FarthestPoint => raw.candidates_per_example,
         },
         features: FeatureScales { contact_m, motion_m },
-        recorded: raw.recorded.as_ref().map(|r| RecordedConfig { file: r.file.0.clone(), fit: r.fit }),
+        recorded: raw.recorded.as_ref().map(recorded),
         stamp_axes: [
             direction(c, &at("stamp_axes"), raw.stamp_axes[0])?,
             direction(c, &at("stamp_axes"), raw.stamp_axes[1])?,
@@ -110,6 +114,25 @@ pub(super) fn check(
         outside: outside.collect::<Result<_, _>>()?,
         ranges,
     })
+}
+
+fn recorded(raw: &RawRecorded) -> RecordedConfig {
+    let time_unit = raw.time_unit.map(|unit| match unit {
+        RawTimeUnit::Seconds => TimeUnit::Seconds,
+        RawTimeUnit::Milliseconds => TimeUnit::Milliseconds,
+        RawTimeUnit::Microseconds => TimeUnit::Microseconds,
+        RawTimeUnit::Nanoseconds => TimeUnit::Nanoseconds,
+    });
+    let quaternion_order = raw.quaternion_order.map(|order| match order {
+        RawQuaternionOrder::Xyzw => QuaternionOrder::Xyzw,
+        RawQuaternionOrder::Wxyz => QuaternionOrder::Wxyz,
+    });
+    let on_bad_row = match raw.on_bad_row {
+        RawOnBadRow::Error => OnBadRow::Error,
+        RawOnBadRow::Skip => OnBadRow::Skip,
+    };
+    let read = ReadOptions { time_unit, quaternion_order, on_bad_row };
+    RecordedConfig { file: raw.file.0.clone(), fit: raw.fit, read }
 }
 
 fn check_tool(

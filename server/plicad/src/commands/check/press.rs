@@ -28,7 +28,7 @@ pub(super) fn slowest(config: &Config, model: &Model) -> anyhow::Result<Option<P
         let [start, end] = way_down(model, &description.shape);
         let [reached_s, end_s] = TICKS.map(|n| n as f64 * model.timestep_s());
         let motion = BenchConfig::press(tool, start, end, [reached_s, end_s]);
-        let tick_us = bench(config, &motion, TICKS[1])?.tick_us.p50;
+        let tick_us = bench(config, &motion, TICKS[1], TICKS[1])?.tick_us.p50;
         if slowest.as_ref().is_none_or(|press| tick_us > press.tick_us) {
             slowest = Some(Press { tool: description.name.clone(), tick_us });
         }

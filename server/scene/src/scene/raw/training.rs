@@ -138,6 +138,51 @@ pub struct RawRecorded {
     /// Whether the trajectory's box is mapped into the workspace above the object.
     #[serde(default)]
     pub fit: bool,
+    /// Unit of the file's times; recognised by a plausible rate where left out.
+    pub time_unit: Option<RawTimeUnit>,
+    /// Order of quaternion components in the file; xyzw where left out.
+    pub quaternion_order: Option<RawQuaternionOrder>,
+    /// What becomes of rows that cannot be played.
+    #[serde(default)]
+    pub on_bad_row: RawOnBadRow,
+}
+
+/// Unit of a motion file's times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+pub enum RawTimeUnit {
+    /// Seconds.
+    #[serde(rename = "s")]
+    Seconds,
+    /// Milliseconds.
+    #[serde(rename = "ms")]
+    Milliseconds,
+    /// Microseconds.
+    #[serde(rename = "us")]
+    Microseconds,
+    /// Nanoseconds.
+    #[serde(rename = "ns")]
+    Nanoseconds,
+}
+
+/// Order of quaternion components in a motion file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RawQuaternionOrder {
+    /// `w` last.
+    Xyzw,
+    /// `w` first.
+    Wxyz,
+}
+
+/// What becomes of rows of a motion file that cannot be played.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RawOnBadRow {
+    /// The file is refused.
+    #[default]
+    Error,
+    /// They are left out.
+    Skip,
 }
 
 /// Drive of the real-time model to a pose, and criterion of settling.

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use plica_client::pattern::Pattern;
 use plica_client::{Client, PoseSource, Subscription, WrenchMessage};
-use plica_trajectory::{self as trajectory, TrackedPose, fit_above, fitted_depth_m};
+use plica_trajectory::{self as trajectory, TrackedPose, Trajectory, fit_above, fitted_depth_m};
 use serde_json::json;
 
 use super::Stop;
@@ -13,6 +13,8 @@ use super::motion::{Plan, plan};
 use crate::args::{Motion, Probe};
 use crate::output::{Output, progress};
 
+/// A motion that takes longer is asked about \[s\].
+const LONG_S: f64 = 3600.0;
 const UPRIGHT: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 const WRENCHES_WAITING: usize = 4096;
 /// Wait for wrenches after the last pose.
@@ -22,10 +24,11 @@ const SILENCE: Duration = Duration::from_secs(1);
 
 pub(crate) fn run(client: &Client, probe: &Probe, output: Output) -> anyhow::Result<()> {
     let plan = plan(client, &probe.motion)?;
-    let poses = match &probe.poses {
-        Some(file) => recorded(file, probe, &plan)?,
-        None => scripted(&probe.motion, &plan),
+    let (poses, report) = match &probe.poses {
+        Some(file) => recorded(file, probe, &plan).map(|motion| (motion.poses, Some(motion.report)))?,
+        None => (scripted(&probe.motion, &plan), None),
     };
+    report.iter().for_each(|report| output.note(&report.to_string()));
     let stop = Stop::on_signals()?;
     let wrenches = client.subscribe_wrenches(&plan.tool, WRENCHES_WAITING)?;
     let bar = progress(Some(poses.len() as u64), "poses");
@@ -61,6 +64,7 @@ pub(crate) fn run(client: &Client, probe: &Probe, output: Output) -> anyhow::Res
     let value = json!({
         "tool": plan.tool, "poses": published, "seconds": seconds, "peak_force_n": peak_n,
         "wrenches_received": stats.received, "wrenches_missed": stats.missed, "wrenches_in_contact": contacts,
+        "motion": report,
     });
     let text = format!(
         "{published} poses to `{}` in {seconds:.1} s; {} wrenches back, {contacts} in contact, peak force {peak_n:.3} N",
@@ -98,13 +102,20 @@ impl Sources {
     }
 }
 
-fn recorded(file: &Path, probe: &Probe, plan: &Plan) -> anyhow::Result<Vec<TrackedPose>> {
-    let mut poses = trajectory::read(file, plica_client::protocol::pose::gate)?;
+fn recorded(file: &Path, probe: &Probe, plan: &Plan) -> anyhow::Result<Trajectory> {
+    let mut motion = trajectory::read(file, probe.reading.options(), plica_client::protocol::pose::gate)?;
+    let (seconds, unit) = (motion.report.duration_s, motion.report.time_unit.name());
+    anyhow::ensure!(
+        seconds <= LONG_S || probe.no_limits,
+        "{}: the motion takes {:.1} hours, times taken for {unit}; --time-unit says another unit, --no-limits plays it",
+        file.display(),
+        seconds / LONG_S
+    );
     if probe.fit {
         let depth_m = probe.motion.depth_m.unwrap_or_else(|| fitted_depth_m(&plan.terrain));
-        fit_above(&mut poses, &plan.terrain, probe.motion.tip_radius_m, depth_m)?;
+        fit_above(&mut motion.poses, &plan.terrain, probe.motion.tip_radius_m, depth_m)?;
     }
-    Ok(poses)
+    Ok(motion)
 }
 
 fn scripted(motion: &Motion, plan: &Plan) -> Vec<TrackedPose> {
