@@ -139,7 +139,7 @@ def test_a_scene_that_names_a_file_20000_times_costs_nothing(plicad, scene, tmp_
         before = memory_kib(daemon)
         text = (folder / "wedge.toml").read_text()
         tool = lambda i: f'[tools.t{i}]\nshape = {{ mesh = {{ file = "mesh.obj" }} }}\n'
-        nested = "[" + ".".join("a" * 70) + "]\nx = [" + "1," * 400_000 + "]\n"
+        nested = "[" + ".".join("a" * 70) + "]\nx = [" + "1," * 200_000 + "]\n"
         scenes = (
             ("".join(f'[a{i}]\nfile="mesh.obj"\n' for i in range(20000)), "scene.toml:"),
             (text + "".join(tool(i) for i in range(10000)), "10001 tools; the allowed range is 0 to 16"),
