@@ -156,18 +156,11 @@ fn every_held_tool_is_quiet() {
 }
 
 /// A slice of the table that takes seconds: presses that swayed by millimetres without end while neighbouring rows passed their load
-/// on too slowly, and some that were quiet with friction.
+/// on too slowly.
 #[test]
 fn held_tools_that_used_to_sway_are_quiet() {
     let ball = ToolShape::Ball { radius_m: 0.006 };
-    let cases = [
-        (3e4, 0.0, false),
-        (3e4, 0.0, true),
-        (1e4, 0.0, false),
-        (1e5, 0.0, false),
-        (3e4, 0.05, false),
-        (3e4, 0.5, false),
-    ];
+    let cases = [(3e4, 0.0, false)];
     for (young_modulus_pa, friction, is_coupled) in cases {
         for (x, y, depth_m) in [(0.0370, 0.0432, 9.36e-3), (0.0431, 0.0191, 5.33e-3)] {
             let hold = Hold { shape: ball.clone(), young_modulus_pa, friction, is_coupled, depth_m, x, y };
