@@ -15,6 +15,7 @@
 
 mod error;
 mod fit;
+mod gate;
 mod layout;
 mod options;
 mod order;
@@ -28,9 +29,10 @@ mod workspace;
 
 pub use error::TrajectoryError;
 pub use fit::{Fit, fit, fit_above, fitted_depth_m};
+pub use gate::Gate;
 pub use options::{OnBadRow, QuaternionOrder, ReadOptions};
 pub use pose::TrackedPose;
-pub use read::{Gate, Trajectory, read};
+pub use read::{Trajectory, read};
 pub use report::{BadRow, MotionReport};
 pub use terrain::Terrain;
 pub use time::TimeUnit;

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 use crate::error::TrajectoryError;
+use crate::gate::Gate;
 use crate::layout::Layout;
 use crate::options::{OnBadRow, QuaternionOrder, ReadOptions};
 use crate::order::{first_step_back, judge};
@@ -18,12 +19,6 @@ const GAP_MEDIANS: f64 = 10.0;
 const GAP_S: f64 = 0.1;
 /// What else can be done about a row that cannot be played.
 const SKIP: &str = "mend the row, or leave out such rows with --on-bad-row skip (in a scene: on_bad_row = \"skip\")";
-
-/// Check of a pose: maps tool, position \[m\] and orientation `xyzw` of a line to the normalised orientation, or to a sentence
-/// why the line is refused.
-pub trait Gate: Fn(Option<&str>, [f64; 3], [f64; 4]) -> Result<[f64; 4], String> {}
-
-impl<F: Fn(Option<&str>, [f64; 3], [f64; 4]) -> Result<[f64; 4], String>> Gate for F {}
 
 /// A motion from a file.
 #[derive(Debug, Clone, PartialEq)]

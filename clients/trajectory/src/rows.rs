@@ -1,8 +1,8 @@
 //! Rows of a motion file: text to numbers, each row by itself.
 
+use crate::gate::Gate;
 use crate::layout::Layout;
 use crate::options::QuaternionOrder;
-use crate::read::Gate;
 use crate::report::BadRow;
 use crate::time::Stamp;
 

@@ -270,7 +270,8 @@ fn shared(folder: &str) -> Option<PathBuf> {
 #[test]
 fn each_case_of_a_motion_file_plays_or_says_what_is_wrong() {
     let Some(folder) = shared("cases/poses") else { return };
-    let cases: [(&str, Result<(usize, f64), &str>); 9] = [
+    type Expected = Result<(usize, f64), &'static str>;
+    let cases: [(&str, Expected); 9] = [
         ("ms.tum", Ok((91, 1.5))),
         ("epoch.csv", Ok((91, 1.5))),
         ("epoch_ns.csv", Ok((91, 1.5))),

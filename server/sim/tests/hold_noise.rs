@@ -140,10 +140,10 @@ fn every_held_tool_is_quiet() {
         let sway = found.iter().map(|q| q.sway_m).fold(0.0, f64::max);
         let forces: Vec<String> = found.iter().map(|q| format!("{:7.3}", q.mean_force_n)).collect();
         let coupling = if h.is_coupled { "spring" } else { "rigid" };
-        let verdict = if found.iter().any(|q| q.noise >= NOISE_BOUND) { "NOISY" } else { "" };
+        let noisy = if found.iter().any(|q| q.noise >= NOISE_BOUND) { "NOISY" } else { "" };
         failed += found.iter().filter(|q| q.noise >= NOISE_BOUND).count();
         println!(
-            "E {:.0e} mu {:.2} {coupling:6} {:9}: noise {}, sway {:.4} mm, force {} N {verdict}",
+            "E {:.0e} mu {:.2} {coupling:6} {:9}: noise {}, sway {:.4} mm, force {} N {noisy}",
             h.young_modulus_pa,
             h.friction,
             name(&h.shape),

@@ -243,21 +243,22 @@ fn numbers_that_the_object_cannot_have_are_refused_with_example_and_value() {
     let turned = |angle: f64| [[angle.cos(), angle.sin(), 0.0], [-angle.sin(), angle.cos(), 0.0], [0.0, 0.0, 1.0]];
     assert_eq!(refused(&|e| e.contact_frame = turned(0.3)), "");
     assert_eq!(refused(&|e| e.detail[3] = [5.1, 0.0, 0.0]), "", "shorter than the diagonal of 5.196 m");
-    let absurd: [(&str, &dyn Fn(&mut Example)); 11] = [
-        ("d[3] is 5.300e0 m long", &|e| e.detail[3] = [5.3, 0.0, 0.0]),
-        ("d[0] is 1.732e30 m long", &|e| e.detail[0] = [1e30; 3]),
-        ("d[6] is ", &|e| e.detail[6] = [3e38; 3]),
-        ("u[4] is 6.000e0 m long", &|e| e.displacements[4] = [0.0, -6.0, 0.0]),
-        ("d_independent[1] is ", &|e| e.independent_detail.as_mut().unwrap()[1] = [9.0; 3]),
-        ("contact_frame [[0.0, 0.0, 0.0]", &|e| e.contact_frame = [[0.0; 3]; 3]),
-        ("contact_frame [[1e300", &|e| e.contact_frame = [[1e300; 3]; 3]),
-        ("contact_frame", &|e| e.contact_frame[2] = [0.0, 0.0, -1.0]),
-        ("contact_point [4.0, 0.0, 0.0] m lies off the object", &|e| e.contact_point = [4.0, 0.0, 0.0]),
-        ("tool_pose is at [10000000000.0, ", &|e| e.tool_pose[0] = 1e10),
-        ("quaternion of tool_pose has length 2e0", &|e| e.tool_pose[6] = 2.0),
+    type Change = fn(&mut Example);
+    let absurd: [(&str, Change); 11] = [
+        ("d[3] is 5.300e0 m long", |e| e.detail[3] = [5.3, 0.0, 0.0]),
+        ("d[0] is 1.732e30 m long", |e| e.detail[0] = [1e30; 3]),
+        ("d[6] is ", |e| e.detail[6] = [3e38; 3]),
+        ("u[4] is 6.000e0 m long", |e| e.displacements[4] = [0.0, -6.0, 0.0]),
+        ("d_independent[1] is ", |e| e.independent_detail.as_mut().unwrap()[1] = [9.0; 3]),
+        ("contact_frame [[0.0, 0.0, 0.0]", |e| e.contact_frame = [[0.0; 3]; 3]),
+        ("contact_frame [[1e300", |e| e.contact_frame = [[1e300; 3]; 3]),
+        ("contact_frame", |e| e.contact_frame[2] = [0.0, 0.0, -1.0]),
+        ("contact_point [4.0, 0.0, 0.0] m lies off the object", |e| e.contact_point = [4.0, 0.0, 0.0]),
+        ("tool_pose is at [10000000000.0, ", |e| e.tool_pose[0] = 1e10),
+        ("quaternion of tool_pose has length 2e0", |e| e.tool_pose[6] = 2.0),
     ];
     for (expected, change) in absurd {
-        let message = refused(change);
+        let message = refused(&change);
         assert!(message.contains("example 2: ") && message.contains(expected), "{expected}: {message}");
     }
 }
