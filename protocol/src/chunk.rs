@@ -38,7 +38,11 @@ impl ChunkHeader {
 /// Other parameters are ignored. Errors with `bad_offset` if it is not a number.
 pub fn offset_of(parameters: &str) -> Result<u64, ErrorReply> {
     let value = parameters.split(';').find_map(|pair| pair.strip_prefix("offset="));
-    value.map_or(Ok(0), |text| text.parse().map_err(|_| bad_offset(text, "a whole number of bytes is expected")))
+    value.map_or(Ok(0), |text| {
+        let digits = text.bytes().all(|b| b.is_ascii_digit());
+        let number = digits.then(|| text.parse().ok()).flatten();
+        number.ok_or_else(|| bad_offset(text, "a whole number of bytes is expected"))
+    })
 }
 
 /// Chunk of `whole` from `offset` on; empty at the end. Errors with `bad_offset` beyond the end.

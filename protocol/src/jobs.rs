@@ -7,6 +7,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::keys::check_name;
+use crate::object;
 use crate::rpc::{ErrorCode, ErrorReply};
 
 /// Largest job request in bytes, with its scene (1 MiB).
@@ -77,6 +78,7 @@ pub struct JobSubmitRequest {
     /// Name chosen by the client, as in keys; two submissions with the same id are one job.
     pub client_id: String,
     /// Kind of the database.
+    #[serde(deserialize_with = "object::name")]
     pub kind: JobKind,
     /// Number of examples, 1 to [`MAX_EXAMPLES`]; left out: the scene's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -153,14 +155,14 @@ pub struct JobFetchRequest {
     /// Id that `job_submit` returned.
     pub id: String,
     /// Requested file.
-    #[serde(rename = "what")]
+    #[serde(rename = "what", deserialize_with = "object::name")]
     pub file: JobFile,
 }
 
 /// A job with its status and progress. Reply of `job_get`, `job_cancel` and `job_resume`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Job {
-    /// Id from the daemon; ids sort in the order of submission.
+    /// Id from the daemon: a number of four digits or more. Later jobs have larger numbers; as text, `10000` is before `9999`.
     pub id: String,
     /// Id from the client.
     pub client_id: String,
@@ -223,6 +225,9 @@ pub struct JobListReply {
     /// Number of older jobs that the list leaves out; `job_get` returns them by id.
     #[serde(default)]
     pub older: u32,
+    /// Number of finished jobs that the daemon has removed since its start, beyond those that it keeps.
+    #[serde(default)]
+    pub removed: u32,
 }
 
 /// Message on `job_progress`, published when a job has changed.

@@ -13,6 +13,7 @@ pub mod encoding;
 mod error;
 pub mod jobs;
 pub mod keys;
+mod object;
 pub mod order;
 pub mod pose;
 pub mod rpc;

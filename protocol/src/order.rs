@@ -1,7 +1,7 @@
 //! Acceptance of poses of a tool: order within a source, and take-over by another source.
 //!
-//! One [`SourceOrder`] per tool. The caller passes the time, so that the rule is the same under a real clock and in
-//! lock-step.
+//! One [`SourceOrder`] per tool. The caller passes simulated time, so that the same poses at the same ticks are accepted, however
+//! fast they arrive.
 
 use crate::pose::Pose;
 
@@ -47,7 +47,7 @@ struct Holder {
 }
 
 impl SourceOrder {
-    /// Accepts or refuses a pose that arrives at `now_s`; a refused pose changes nothing.
+    /// Accepts or refuses a pose that arrives at simulated time `now_s`; a refused pose changes nothing.
     ///
     /// The holder is stale once its last accepted pose is older than `stale_after_s`. Then the next valid pose of any source is
     /// accepted, with any sequence. A pose with sequence 0 is unnumbered: only its source is compared.
@@ -55,7 +55,8 @@ impl SourceOrder {
         if !pose.valid {
             return Err(Refusal::Invalid);
         }
-        let fresh = self.holder.filter(|holder| now_s - holder.taken_at_s <= stale_after_s);
+        // A holder from later than now belongs to a time before a reset.
+        let fresh = self.holder.filter(|holder| (0.0..=stale_after_s).contains(&(now_s - holder.taken_at_s)));
         match fresh {
             Some(holder) if holder.source_id != pose.source_id => return Err(Refusal::Conflict),
             Some(holder) => holder.check(pose.sequence)?,
@@ -68,7 +69,7 @@ impl SourceOrder {
         Ok(())
     }
 
-    /// Forgets the holder: the next valid pose of any source is accepted (`rpc/reset`).
+    /// Forgets the holder: the next valid pose of any source is accepted (`rpc/reset`, `rpc/restore`).
     pub fn forget(&mut self) {
         self.holder = None;
     }
@@ -116,6 +117,13 @@ mod tests {
         assert_eq!(order.take(&pose(2, 1), 0.5, 0.1), Ok(()));
         order.forget();
         assert_eq!(order.take(&pose(3, 1), 0.5, 0.1), Ok(()));
+    }
+
+    #[test]
+    fn a_holder_of_a_time_that_was_restored_away_holds_nothing() {
+        let mut order = SourceOrder::default();
+        assert_eq!(order.take(&pose(1, 100), 5.0, 0.1), Ok(()));
+        assert_eq!(order.take(&pose(2, 1), 4.9, 0.1), Ok(()));
     }
 
     #[test]

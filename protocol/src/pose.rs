@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::bytes::{Layout, finite, open_exact};
 use crate::error::DecodeError;
 use crate::keys::check_name;
+use crate::object::from_object;
 
 /// First bytes of a pose.
 pub const MAGIC: [u8; 4] = *b"PLPS";
@@ -89,7 +90,7 @@ impl Pose {
 
     /// Decodes the JSON form and applies the gate.
     pub fn decode_json(bytes: &[u8]) -> Result<Self, DecodeError> {
-        let json: JsonPose = serde_json::from_slice(bytes).map_err(|error| DecodeError::Json(error.to_string()))?;
+        let json: JsonPose = from_object(bytes).map_err(|error| DecodeError::Json(error.to_string()))?;
         json.to_pose()
     }
 

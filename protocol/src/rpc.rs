@@ -2,14 +2,24 @@
 //!
 //! An empty payload counts as `{}`. Unknown keys are errors, so that a misspelt key does not become a silent default.
 
+use std::time::Duration;
+
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::error::DecodeError;
+use crate::object::{self, from_object};
 use crate::pose::{JsonPose, Pose, yes};
 
-/// Most ticks of one `step`; they must pass within a client's time-out.
+/// Most ticks of one `step`.
 pub const MAX_STEP_TICKS: u32 = 10_000;
+/// Most poses of one `step`.
+pub const MAX_STEP_POSES: usize = 1024;
+/// Snapshots that are kept; the oldest is overwritten.
+pub const MAX_SNAPSHOTS: u64 = 8;
+/// Time from the arrival of a request after which a `step` stops early and a request that still waits is refused. Shorter than
+/// the time-out of a client, so that no client is left without an answer.
+pub const ANSWER_WITHIN: Duration = Duration::from_secs(4);
 
 /// Methods of a daemon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -22,6 +32,8 @@ pub enum Method {
     Resume,
     /// Runs ticks while paused. Request [`StepRequest`], reply [`StepReply`].
     Step,
+    /// Ends the `step` that runs, after its present tick. Request `{}`, reply [`StateReply`].
+    Interrupt,
     /// Stores the present state. Request `{}`, reply [`SnapshotReply`].
     Snapshot,
     /// Returns to a stored state. Request [`RestoreRequest`], reply [`StateReply`].
@@ -44,11 +56,12 @@ pub enum Method {
 
 impl Method {
     /// All methods.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Reset,
         Self::Pause,
         Self::Resume,
         Self::Step,
+        Self::Interrupt,
         Self::Snapshot,
         Self::Restore,
         Self::JobSubmit,
@@ -67,6 +80,7 @@ impl Method {
             Self::Pause => "pause",
             Self::Resume => "resume",
             Self::Step => "step",
+            Self::Interrupt => "interrupt",
             Self::Snapshot => "snapshot",
             Self::Restore => "restore",
             Self::JobSubmit => "job_submit",
@@ -93,10 +107,10 @@ impl Method {
     }
 }
 
-/// Decodes a request. Errors with `rpc_malformed`.
+/// Decodes a request, which is a JSON object. Errors with `rpc_malformed`.
 pub fn decode_request<T: DeserializeOwned>(payload: &[u8]) -> Result<T, ErrorReply> {
     let payload = if payload.is_empty() { b"{}" } else { payload };
-    serde_json::from_slice(payload).map_err(|error| ErrorReply::new(ErrorCode::RpcMalformed, error.to_string()))
+    from_object(payload).map_err(|error| ErrorReply::new(ErrorCode::RpcMalformed, error.to_string()))
 }
 
 /// Request of a method without arguments, `{}`.
@@ -110,9 +124,26 @@ pub struct EmptyRequest {}
 pub struct StepRequest {
     /// Number of ticks, 0 to [`MAX_STEP_TICKS`].
     pub ticks: u32,
-    /// Poses to apply before the first tick.
-    #[serde(default)]
+    /// Poses to apply before the first tick, at most [`MAX_STEP_POSES`].
+    #[serde(default, deserialize_with = "object::list")]
     pub poses: Vec<StepPose>,
+    /// Tick at which the simulation must be, else the step is refused with `wrong_tick`. Makes repeating a step harmless.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from_tick: Option<u64>,
+}
+
+impl StepRequest {
+    /// Checks counts. Errors with `rpc_malformed`.
+    pub fn check(&self) -> Result<(), ErrorReply> {
+        let malformed = |message| Err(ErrorReply::new(ErrorCode::RpcMalformed, message));
+        if self.ticks > MAX_STEP_TICKS {
+            return malformed(format!("ticks is {}; the allowed range is 0 to {MAX_STEP_TICKS}", self.ticks));
+        }
+        if self.poses.len() > MAX_STEP_POSES {
+            return malformed(format!("{} poses; at most {MAX_STEP_POSES} fit into one step", self.poses.len()));
+        }
+        Ok(())
+    }
 }
 
 /// Pose of a named tool: `{"tool": name, ...}` with the keys of the JSON pose.
@@ -168,11 +199,18 @@ pub struct RestoreRequest {
     pub id: String,
 }
 
+impl RestoreRequest {
+    /// Number of the snapshot; `None` if the text is not exactly an id that `snapshot` can have returned.
+    pub fn number(&self) -> Option<u64> {
+        self.id.parse().ok().filter(|number: &u64| number.to_string() == self.id)
+    }
+}
+
 /// Request of `activate`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ActivateRequest {
-    /// Id of a finished job (digits only), or path of a database on the daemon's machine.
+    /// Id of a finished job (digits only), or name of a file in the folder of databases that the daemon was started with.
     pub database: String,
 }
 
@@ -222,6 +260,20 @@ pub struct SnapshotReply {
     pub id: String,
 }
 
+/// Whether a request that was answered with an error was carried out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Done {
+    /// Nothing was done.
+    No,
+    /// A part was done: a step stopped early, at [`ErrorReply::tick`].
+    Partly,
+    /// Not known, also to readers of a value from later versions.
+    #[default]
+    #[serde(other)]
+    Unknown,
+}
+
 /// Error in place of a reply.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ErrorReply {
@@ -229,14 +281,42 @@ pub struct ErrorReply {
     pub code: String,
     /// A sentence for a person.
     pub message: String,
-    /// True if the same request may succeed later.
+    /// True if nothing was done and the same request may succeed later.
     pub retryable: bool,
+    /// Whether the request was carried out.
+    #[serde(default)]
+    pub done: Done,
+    /// Tick that the simulation has reached; of steps only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tick: Option<u64>,
+    /// Ticks that the step has run; of steps only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ticks_done: Option<u32>,
 }
 
 impl ErrorReply {
     /// Error with a known code.
     pub fn new(code: ErrorCode, message: impl Into<String>) -> Self {
-        Self { code: code.name().to_owned(), message: message.into(), retryable: code.retryable() }
+        Self {
+            code: code.name().to_owned(),
+            message: message.into(),
+            retryable: code.retryable(),
+            done: code.done(),
+            tick: None,
+            ticks_done: None,
+        }
+    }
+
+    /// A step that stopped before its last tick.
+    #[must_use]
+    pub fn stopped_at(self, tick: u64, ticks_done: u32) -> Self {
+        Self { retryable: false, done: Done::Partly, tick: Some(tick), ticks_done: Some(ticks_done), ..self }
+    }
+
+    /// A request that was not carried out and may succeed later.
+    #[must_use]
+    pub fn nothing_done_yet(self) -> Self {
+        Self { retryable: true, done: Done::No, ..self }
     }
 
     /// The payload of the reply.
@@ -256,6 +336,10 @@ pub enum ErrorCode {
     RpcMalformed,
     /// `step` while the simulation's clock runs.
     NotPaused,
+    /// `step` with a `from_tick` at which the simulation is not.
+    WrongTick,
+    /// A `step` that `interrupt` has stopped early.
+    Interrupted,
     /// A pose inside a request did not pass the gate, or is out of order.
     BadPose,
     /// A tool that the scene does not have.
@@ -284,7 +368,7 @@ pub enum ErrorCode {
     NotReady,
     /// The queue of requests is full.
     Busy,
-    /// The simulation did not answer in time.
+    /// A `step` that stopped early at its limit of time, or a simulation that did not answer.
     TimedOut,
     /// The daemon is stopping.
     ShuttingDown,
@@ -294,11 +378,13 @@ pub enum ErrorCode {
 
 impl ErrorCode {
     /// All codes.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 23] = [
         Self::RpcUnknown,
         Self::RpcWildcard,
         Self::RpcMalformed,
         Self::NotPaused,
+        Self::WrongTick,
+        Self::Interrupted,
         Self::BadPose,
         Self::UnknownTool,
         Self::UnknownObject,
@@ -325,6 +411,8 @@ impl ErrorCode {
             Self::RpcWildcard => "rpc_wildcard",
             Self::RpcMalformed => "rpc_malformed",
             Self::NotPaused => "not_paused",
+            Self::WrongTick => "wrong_tick",
+            Self::Interrupted => "interrupted",
             Self::BadPose => "bad_pose",
             Self::UnknownTool => "unknown_tool",
             Self::UnknownObject => "unknown_object",
@@ -345,8 +433,17 @@ impl ErrorCode {
         }
     }
 
-    /// True if the same request may succeed later.
+    /// True if nothing was done and the same request may succeed later.
     pub fn retryable(self) -> bool {
-        matches!(self, Self::NotReady | Self::Busy | Self::TimedOut | Self::TooManyJobs)
+        matches!(self, Self::NotReady | Self::Busy | Self::TooManyJobs)
+    }
+
+    /// Whether a request with this error was carried out, unless the reply says otherwise.
+    pub fn done(self) -> Done {
+        match self {
+            Self::TimedOut | Self::ShuttingDown | Self::Internal => Done::Unknown,
+            Self::Interrupted => Done::Partly,
+            _ => Done::No,
+        }
     }
 }

@@ -12,6 +12,9 @@ use crate::jobs::JobStatus;
 /// Counters by kind of event.
 pub type Counters = BTreeMap<String, u64>;
 
+/// Names of the stages of a tick, in the order in which a tick runs them.
+pub const STAGES: [&str; 6] = ["poses", "contact", "solve", "embedding", "gates", "enrichment"];
+
 /// Counter of a tool: a pose was good, but too many were waiting for the next tick.
 pub const QUEUE_FULL: &str = "queue_full";
 /// Counter of the daemon: a question got no answer, because too many answers were waiting.
@@ -90,6 +93,16 @@ pub enum Scheduling {
     Normal,
 }
 
+impl Scheduling {
+    /// Name in JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fifo => "fifo",
+            Self::Normal => "normal",
+        }
+    }
+}
+
 /// Summary of a histogram.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
@@ -124,6 +137,8 @@ pub struct ObjectStatus {
     pub enriched: bool,
     /// Times that a non-finite state was rolled back.
     pub rollbacks: u64,
+    /// Counts activations of examples; 0: none are active.
+    pub database_generation: u32,
     /// Least confidence over the tools in contact; null without enrichment.
     pub confidence: Option<f64>,
     /// Frames handed to the bus.
@@ -152,10 +167,12 @@ pub struct SolverStatus {
 pub struct ToolStatus {
     /// Sequence of the newest accepted pose.
     pub pose_sequence: u64,
-    /// Seconds since it arrived; null before the first.
+    /// Simulated seconds since it arrived; null before the first.
     pub pose_age_s: Option<f64>,
     /// Whether poses have stopped and the tool is held.
     pub stale: bool,
+    /// Age of the newest pose at which the tool is stale and another source takes over, in simulated milliseconds.
+    pub stale_after_ms: f64,
     /// Whether it touches something.
     pub in_contact: bool,
     /// Number of active contacts.

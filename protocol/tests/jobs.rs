@@ -66,7 +66,7 @@ fn replies_are_flat_and_come_back() {
     assert!(json["seed"].is_null() && json["reason"].is_null());
     let reply = comes_back(&JobSubmitReply { created: true, job: job.clone() });
     assert_eq!((&reply["created"], &reply["id"]), (&true.into(), &"0003".into()));
-    comes_back(&JobListReply { jobs: vec![job.clone()], older: 7 });
+    comes_back(&JobListReply { jobs: vec![job.clone()], older: 7, removed: 3 });
     let progress = comes_back(&JobProgressMessage::from(&job));
     assert_eq!((&progress["stage"], &progress["rejected"]), (&"examples".into(), &1.into()));
     let status = comes_back(&JobStatus::from(&job));
@@ -105,16 +105,24 @@ fn requests_of_another_shape_are_malformed() {
         r#"{"client_id": "a", "kind": "training", "examples": 1.5}"#,
         r#"{"client_id": "a", "kind": "training", "seed": 18446744073709551616}"#,
         r#"{"client_id": 7, "kind": "training"}"#,
+        r#"{"client_id": "a", "kind": {"training": null}}"#,
+        r#"["a", "training"]"#,
         r#"{"client_id": "a", "kind": "training", "scene": ["x"]}"#,
     ];
     for text in bad {
         let error = decode_request::<JobSubmitRequest>(text.as_bytes()).unwrap_err();
         assert_eq!((error.code.as_str(), error.retryable), ("rpc_malformed", false), "{text}");
     }
-    for text in ["{}", r#"{"id": 3}"#, r#"{"id": "3", "force": true}"#] {
+    for text in ["{}", r#"{"id": 3}"#, r#"{"id": "3", "force": true}"#, r#"["3"]"#] {
         assert_eq!(decode_request::<JobRequest>(text.as_bytes()).unwrap_err().code, "rpc_malformed", "{text}");
     }
-    for text in [r#"{"id": "3"}"#, r#"{"id": "3", "what": "log"}"#, r#"{"id": "3", "what": "../x"}"#] {
+    for text in [
+        r#"{"id": "3"}"#,
+        r#"{"id": "3", "what": "log"}"#,
+        r#"{"id": "3", "what": "../x"}"#,
+        r#"["3", "report"]"#,
+        r#"{"id": "3", "what": {"report": null}}"#,
+    ] {
         assert_eq!(decode_request::<JobFetchRequest>(text.as_bytes()).unwrap_err().code, "rpc_malformed", "{text}");
     }
 }

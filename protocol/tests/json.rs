@@ -88,9 +88,62 @@ fn methods_and_codes() {
     let error = Method::parse("rest").unwrap_err();
     assert_eq!(
         error.to_json(),
-        r#"{"code":"rpc_unknown","message":"no method `rest`; there are reset, pause, resume, step, snapshot, restore, job_submit, job_list, job_get, job_cancel, job_resume, job_fetch, activate","retryable":false}"#
+        r#"{"code":"rpc_unknown","message":"no method `rest`; there are reset, pause, resume, step, interrupt, snapshot, restore, job_submit, job_list, job_get, job_cancel, job_resume, job_fetch, activate","retryable":false,"done":"no"}"#
     );
     assert!(ErrorReply::new(ErrorCode::Busy, "").retryable);
+}
+
+#[test]
+fn repeating_is_only_advised_where_nothing_was_done() {
+    for code in ErrorCode::ALL {
+        let reply = ErrorReply::new(code, "");
+        assert!(!reply.retryable || reply.done == Done::No, "{reply:?}");
+    }
+    let stopped = ErrorReply::new(ErrorCode::TimedOut, "").stopped_at(1200, 200);
+    let expected =
+        r#"{"code":"timed_out","message":"","retryable":false,"done":"partly","tick":1200,"ticks_done":200}"#;
+    assert_eq!(stopped.to_json(), expected);
+    // A reply of an earlier version does not say it, and one of a later version may say something new.
+    for done in ["", r#", "done": "twice""#] {
+        let json = format!(r#"{{"code": "busy", "message": "", "retryable": true{done}}}"#);
+        assert_eq!(serde_json::from_str::<ErrorReply>(&json).unwrap().done, Done::Unknown);
+    }
+}
+
+#[test]
+fn an_array_is_no_object_wherever_one_is_expected() {
+    let pose = "[\"probe\", 0, 0, 5, true, [0, 0, 0], [0, 0, 0, 1], 0, 0]";
+    let step = format!("{{\"ticks\": 1, \"poses\": [{pose}]}}");
+    for request in ["[]", "[1]", "[1, []]", "null", "1", "true", "\"x\"", " ", "[{}]", &step] {
+        let code = |error: ErrorReply| error.code;
+        assert_eq!(
+            decode_request::<EmptyRequest>(request.as_bytes()).map_err(code),
+            Err("rpc_malformed".into()),
+            "{request}"
+        );
+        assert_eq!(
+            decode_request::<StepRequest>(request.as_bytes()).map_err(code),
+            Err("rpc_malformed".into()),
+            "{request}"
+        );
+    }
+    decode_request::<RestoreRequest>(br#"["0001"]"#).unwrap_err();
+    decode_request::<ActivateRequest>(br#"["0001"]"#).unwrap_err();
+    let pose = b"[0, 0, 5, true, [0, 0, 0], [0, 0, 0, 1], 0, 0]";
+    assert_eq!(Pose::decode_json(pose).map_err(|e| e.kind()), Err("bad_json"));
+    // A key twice, or one too many, is refused as before.
+    for bad in [r#"{"ticks": 1, "ticks": 2}"#, r#"{"ticks": 1, "tick": 2}"#] {
+        decode_request::<StepRequest>(bad.as_bytes()).unwrap_err();
+    }
+}
+
+#[test]
+fn a_snapshot_id_is_compared_as_text() {
+    let number = |id: &str| RestoreRequest { id: id.to_owned() }.number();
+    assert_eq!(number("1"), Some(1));
+    for id in ["+1", "0001", "01", " 1", "1 ", "1.0", "", "-1", "99999999999999999999"] {
+        assert_eq!(number(id), None, "{id}");
+    }
 }
 
 #[test]
@@ -111,7 +164,7 @@ fn offsets_are_selector_parameters() {
     assert_eq!(offset_of("").unwrap(), 0);
     assert_eq!(offset_of("offset=524288").unwrap(), 524_288);
     assert_eq!(offset_of("_time=now;offset=7").unwrap(), 7);
-    for bad in ["offset=", "offset=-1", "offset=1e3", "offset=99999999999999999999"] {
+    for bad in ["offset=", "offset=-1", "offset=+7", "offset=1e3", "offset=99999999999999999999"] {
         assert_eq!(offset_of(bad).unwrap_err().code, "bad_offset", "{bad}");
     }
     let header = ChunkHeader { total_bytes: 3, offset: 0, sha256: "00".repeat(32) };
@@ -145,4 +198,22 @@ fn the_page_names_every_counter_and_every_code() {
         let in_a_table = |line: &str| line.starts_with('|') && line.contains(&format!("`{name}`"));
         assert!(page.lines().any(in_a_table), "no table of PROTOCOL.md has `{name}`");
     }
+}
+
+#[test]
+fn the_page_names_the_limits() {
+    let page = include_str!("../PROTOCOL.md");
+    let limits = page.split("**Limits.**").nth(1).unwrap().split("\n## ").next().unwrap();
+    let zenoh = include_str!("../../configs/zenoh/default.json5");
+    let thousands = |n: usize| if n < 1000 { n.to_string() } else { format!("{},{:03}", n / 1000, n % 1000) };
+    let ticks_and_poses = format!("| {} and {} |", thousands(MAX_STEP_TICKS as usize), thousands(MAX_STEP_POSES));
+    for row in [ticks_and_poses, format!("| {MAX_SNAPSHOTS} | snapshots"), "| 64 | clients".into(), "| 4 MiB |".into()]
+    {
+        assert!(limits.contains(&row), "{row}");
+    }
+    assert!(
+        zenoh.contains("max_sessions: 64,") && zenoh.contains("max_message_size: 4194304"),
+        "they stand on the page"
+    );
+    assert!(page.contains(&format!("stops early after {} s", ANSWER_WITHIN.as_secs())));
 }

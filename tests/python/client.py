@@ -19,12 +19,13 @@ assert (POSE.size, SKIN.size, WRENCH.size) == (96, 64, 192)
 ENRICHED, NORMALS_FOLLOW, SIXTEEN_BIT, SLEEPING = 1, 8, 16, 4
 TIMEOUT_S = 20.0
 
-Frame = namedtuple("Frame", "sequence tick sim_time_s pose_time_ns flags confidence generation positions")
-Wrench = namedtuple("Wrench", "sequence tick sim_time_s pose_sequence pose_time_ns force torque flags n_contacts confidence")
+Frame = namedtuple("Frame", "sequence tick sim_time_s pose_time_ns flags confidence generation positions normals")
+Wrench = namedtuple("Wrench", "sequence tick sim_time_s pose_sequence pose_time_ns force torque contact_point proxy_position "
+                              "proxy_orientation flags n_contacts confidence")
 
 
 class ErrorReply(Exception):
-    """An error reply of the daemon: code, message, retryable."""
+    """An error reply of the daemon: code, message, retryable, done, and of steps the tick."""
 
     def __init__(self, payload):
         body = json.loads(payload)
@@ -44,6 +45,7 @@ class Client:
         config.insert_json5("scouting/gossip/enabled", "false")
         self.root = f"plica/v1/{session}"
         self.session = zenoh.open(config)
+        self.rest = {}
 
     def close(self):
         self.session.close()
@@ -76,8 +78,9 @@ class Client:
         try:
             reply = self.rpc(method, request)
         except ErrorReply as error:
-            assert set(error.body) >= {"code", "message", "retryable"}, error.body
+            assert set(error.body) >= {"code", "message", "retryable", "done"}, error.body
             assert isinstance(error.body["retryable"], bool) and error.body["message"], error.body
+            assert error.body["done"] == "no" or not error.body["retryable"], error.body
             return error
         raise AssertionError(f"rpc/{method} was not refused: {reply}")
 
@@ -85,7 +88,13 @@ class Client:
         return json.loads(self.ask("status").payload.to_bytes())
 
     def frame(self, name="wedge"):
-        return read_frame(self.ask(f"object/{name}/skin").payload.to_bytes())
+        return self.read_frame(self.ask(f"object/{name}/skin").payload.to_bytes(), name)
+
+    def read_frame(self, data, name="wedge"):
+        """A frame in either format; the 16-bit one holds offsets from the mesh, which is fetched once."""
+        if data[44] & SIXTEEN_BIT and name not in self.rest:
+            self.rest[name] = mesh_positions(self.mesh(name))
+        return read_frame(data, self.rest.get(name))
 
     def mesh(self, name="wedge"):
         """The GLB, piece by piece."""
@@ -152,21 +161,40 @@ def pose(position, *, sequence=0, source_id=1, time_ns=None, orientation=(0, 0, 
     return POSE.pack(magic, version, size, sequence, time_ns, source_id, int(valid), *position, *orientation, 0, 0.0)
 
 
-def read_frame(data):
+def read_frame(data, rest=None):
+    """A skin frame; in the 16-bit format positions are offsets from `rest`, the positions of the mesh."""
     magic, version, size, sequence, tick, sim_time, pose_time, n, flags, confidence, generation, scale, _ = SKIN.unpack_from(data)
     assert (magic, version, size) == (b"PLSK", 1, 64)
-    assert not flags & SIXTEEN_BIT, "this client reads the f32 format"
-    assert len(data) == 64 + (24 if flags & NORMALS_FOLLOW else 12) * n and scale == 0
-    positions = np.frombuffer(data, "<f4", 3 * n, 64).reshape(n, 3)
-    return Frame(sequence, tick, sim_time, pose_time, flags, confidence, generation, positions)
+    short, has_normals = bool(flags & SIXTEEN_BIT), bool(flags & NORMALS_FOLLOW)
+    kind = np.dtype("<i2" if short else "<f4")
+    assert len(data) == 64 + (2 if has_normals else 1) * 3 * n * kind.itemsize and (scale > 0) == short
+    vectors = np.frombuffer(data, kind, offset=64).reshape(-1, n, 3)
+    positions, normals = vectors[0], vectors[1] if has_normals else None
+    if short:
+        assert rest is not None and len(rest) == n, "the 16-bit format needs the rest positions of the mesh"
+        positions = rest + np.float32(scale) * positions
+        normals = normals / 32767 if has_normals else None
+    return Frame(sequence, tick, sim_time, pose_time, flags, confidence, generation, positions, normals)
 
 
 def read_wrench(data):
     assert len(data) == 192
     v = WRENCH.unpack(data)
     assert v[:3] == (b"PLWR", 1, 192)
-    return Wrench(*v[3:8], force=np.array(v[8:11]), torque=np.array(v[11:14]), flags=v[24], n_contacts=v[25],
+    return Wrench(*v[3:8], force=np.array(v[8:11]), torque=np.array(v[11:14]), contact_point=np.array(v[14:17]),
+                  proxy_position=np.array(v[17:20]), proxy_orientation=np.array(v[20:24]), flags=v[24], n_contacts=v[25],
                   confidence=v[26])
+
+
+def mesh_positions(glb):
+    """Rest positions of a GLB as frames have them: without the transform of its node."""
+    text_bytes = struct.unpack_from("<I", glb, 12)[0]
+    scene, binary = json.loads(glb[20:20 + text_bytes]), glb[28 + text_bytes:]
+    accessor = scene["accessors"][scene["meshes"][0]["primitives"][0]["attributes"]["POSITION"]]
+    view = scene["bufferViews"][accessor["bufferView"]]
+    first = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+    assert accessor["componentType"] == 5126 and view.get("byteStride", 12) == 12
+    return np.frombuffer(binary, "<f4", 3 * accessor["count"], first).reshape(-1, 3)
 
 
 def wait_until(condition, what, timeout_s=TIMEOUT_S):

@@ -69,6 +69,11 @@ class Daemon:
         assert code == 0, f"plicad ended with {code}:\n{self.log.read_text()}"
         return time.monotonic() - began
 
+    def kill(self):
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
+
 
 @pytest.fixture
 def daemon(plicad, scene, tmp_path):
@@ -79,9 +84,7 @@ def daemon(plicad, scene, tmp_path):
         if running.process.poll() is None:
             running.stop()
     finally:
-        if running.process.poll() is None:
-            running.process.kill()
-            running.process.wait()
+        running.kill()
 
 
 @pytest.fixture

@@ -1,5 +1,9 @@
 """Examples that a job has made enrich the skin: from activation on, without a lost frame, and only where they belong."""
 
+import hashlib
+import json
+import os
+import struct
 import subprocess
 
 import numpy as np
@@ -22,7 +26,11 @@ def small(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def daemon(plicad, small, tmp_path_factory):
-    with running(plicad, small, tmp_path_factory.mktemp("daemon") / "plicad.log") as daemon:
+    place = tmp_path_factory.mktemp("daemon")
+    (place / "databases").mkdir()
+    options = ["--databases", str(place / "databases")]
+    with running(plicad, small, place / "plicad.log", options=options) as daemon:
+        daemon.databases = place / "databases"
         yield daemon
 
 
@@ -87,15 +95,24 @@ def test_activating_loses_no_frame_and_changes_the_skin(daemon, client, database
 def test_activating_again_is_another_generation(daemon, client, database):
     one = client.rpc("activate", {"database": database})["database_generation"]
     path = daemon.data / "jobs" / database / "database.safetensors"
-    other = client.rpc("activate", {"database": str(path)})["database_generation"]
-    assert other == one + 1 == client.frame().generation
+    (daemon.databases / "mine.safetensors").write_bytes(path.read_bytes())
+    (daemon.databases / "link").symlink_to("mine.safetensors")
+    for generation, name in ((one + 1, "mine.safetensors"), (one + 2, "link")):
+        other = client.rpc("activate", {"database": name})["database_generation"]
+        assert other == generation == client.frame().generation
 
 
 def test_what_does_not_belong_is_refused_for_its_reason(daemon, client, database, tmp_path):
     foreign = made(client, "foreign", examples=2, scene=OTHER)
     held_out = made(client, "held-out", "evaluation", examples=2)
     path = daemon.data / "jobs" / database / "database.safetensors"
-    damaged, cut, empty = tmp_path / "damaged", tmp_path / "cut", tmp_path / "empty"
+    damaged, cut, empty = (daemon.databases / name for name in ("damaged", "cut", "empty"))
+    (daemon.databases / "folder").mkdir()
+    os.mkfifo(daemon.databases / "pipe")
+    (daemon.databases / "out").symlink_to(path)
+    (daemon.databases / "device").symlink_to("/dev/zero")
+    with open(daemon.databases / "sparse", "wb") as sparse:
+        sparse.truncate(4 << 30)
     whole = path.read_bytes()
     damaged.write_bytes(whole[:-5] + bytes([whole[-5] ^ 1]) + whole[-4:])
     cut.write_bytes(whole[:len(whole) // 2])
@@ -105,12 +122,18 @@ def test_what_does_not_belong_is_refused_for_its_reason(daemon, client, database
     refusals = [
         ({"database": foreign}, "bad_database", "another scene"),
         ({"database": held_out}, "bad_database", "held-out"),
-        ({"database": str(damaged)}, "bad_database", "damaged"),
-        ({"database": str(cut)}, "bad_database", "truncated"),
-        ({"database": str(empty)}, "bad_database", "truncated"),
-        ({"database": str(tmp_path)}, "bad_database", "is no file"),
-        ({"database": "/dev/zero"}, "bad_database", "is no file"),
-        ({"database": "no/such"}, "bad_database", "no/such: cannot be read"),
+        ({"database": "damaged"}, "bad_database", "damaged: damaged: SHA-256"),
+        ({"database": "cut"}, "bad_database", "cut: truncated"),
+        ({"database": "empty"}, "bad_database", "empty: truncated"),
+        ({"database": "folder"}, "bad_database", "folder: is no regular file"),
+        ({"database": "pipe"}, "bad_database", "pipe: is no regular file"),
+        ({"database": "out"}, "bad_database", "out: is a link that leads out"),
+        ({"database": "device"}, "bad_database", "device: is a link that leads out"),
+        ({"database": "sparse"}, "bad_database", "sparse: has 4294967296 bytes; at most"),
+        ({"database": "none"}, "bad_database", "none: cannot be read: No such file"),
+        *(({"database": bad}, "bad_database", "is no name of a file") for bad in
+          ("", ".", "..", "/", "/dev/zero", "/proc/self/pagemap", "/proc/kmsg", "no/such", "../databases/cut", "./cut",
+           "cut/", "a\\b", "a\0b", str(path))),
         ({"database": slow}, "job_state", "when it is done"),
         ({"database": "9999"}, "unknown_job", "9999"),
         ({}, "rpc_malformed", "database"),
@@ -119,11 +142,59 @@ def test_what_does_not_belong_is_refused_for_its_reason(daemon, client, database
     for request, code, reason in refusals:
         error = client.refused("activate", request)
         assert error.code == code and reason in error.body["message"], f"{request}: {error}"
-        assert str(daemon.data) not in error.body["message"], "where jobs lie is nobody's business"
+        assert str(daemon.data) not in error.body["message"] or request["database"] == str(path)
+        assert str(daemon.databases) not in error.body["message"], "where databases lie is nobody's business"
     client.rpc("job_cancel", {"id": slow})
     assert job(client, slow)["state"] == "cancelled"
     assert client.frame().generation == generation
     print("\n" + client.refused("activate", {"database": foreign}).body["message"])
+
+
+def with_numbers(whole, name, change):
+    """A database with one tensor changed by `change` (array to array), and the checksum made right."""
+    (n,) = struct.unpack_from("<Q", whole)
+    header = json.loads(whole[8:8 + n])
+    body = bytearray(whole[8 + n:])
+    tensors = {key: value for key, value in header.items() if key != "__metadata__"}
+    first, last = tensors[name]["data_offsets"]
+    kind = {"F32": "<f4", "F64": "<f8"}[tensors[name]["dtype"]]
+    array = np.frombuffer(bytes(body[first:last]), kind).reshape(tensors[name]["shape"])
+    body[first:last] = change(array.copy()).astype(kind).tobytes()
+    about = header["__metadata__"]["plica"]
+    old = json.loads(about)["sha256"]
+    total = hashlib.sha256(about.replace(old, "0" * 64).encode())
+    for key in sorted(tensors):
+        tensor = tensors[key]
+        total.update(f"{key} {tensor['dtype']} [{','.join(map(str, tensor['shape']))}]\n".encode())
+        total.update(bytes(body[slice(*tensor["data_offsets"])]))
+    text = whole[8:8 + n].replace(old.encode(), total.hexdigest().encode())
+    return whole[:8] + text + bytes(body)
+
+
+def test_numbers_that_the_object_cannot_have_are_refused(daemon, client, database):
+    whole = (daemon.data / "jobs" / database / "database.safetensors").read_bytes()
+    same = with_numbers(whole, "d", lambda d: d)
+    assert same == whole, "the checksum of this test is that of the page"
+    fill = lambda value: lambda array: np.full_like(array, value)
+    absurd = [
+        ("d", fill(1e30), "d[0] is 1.732e30 m long"),
+        ("d", fill(3e38), "d[0] is "),
+        ("d", fill(1.0), "d[0] is 1.732e0 m long; at most the object's diagonal of 0.0600 m"),
+        ("d", fill(np.nan), "not finite"),
+        ("u", fill(0.1), "u[0] is "),
+        ("contact_frame", fill(0.0), "is not orthonormal"),
+        ("contact_frame", fill(1e300), "is not orthonormal"),
+        ("contact_frame", lambda frame: 1.00001 * frame, "is not orthonormal"),
+        ("contact_point", fill(1.0), "lies off the object"),
+        ("tool_pose", fill(1e9), "tool_pose"),
+    ]
+    generation = client.frame().generation
+    for name, change, why in absurd:
+        (daemon.databases / "absurd").write_bytes(with_numbers(whole, name, change))
+        error = client.refused("activate", {"database": "absurd"})
+        assert error.code == "bad_database" and why in error.body["message"], error
+        assert "example " in error.body["message"], error
+    assert client.frame().generation == generation
 
 
 def test_simulate_gives_the_enriched_bytes_of_the_daemon(daemon, plicad, small, client, database, tmp_path):

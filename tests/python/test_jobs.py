@@ -201,7 +201,7 @@ def test_a_job_from_submission_to_result(daemon, client):
         motion.check_that_ticks_go_on()
     assert done["done"] + done["rejected"] == done["total"] == 4 and done["done"] > 0
     assert done["submitted_unix_s"] <= done["started_unix_s"] <= done["finished_unix_s"] and done["reason"] is None
-    assert client.rpc("job_list") == {"jobs": [done], "older": 0}
+    assert client.rpc("job_list") == {"jobs": [done], "older": 0, "removed": 0}
     status = client.status()
     assert status["jobs"] == [{key: done[key] for key in ("id", "state", "done", "rejected", "total")}]
     assert status["jobs_unavailable"] is None
@@ -346,7 +346,7 @@ def test_jobs_are_refused_for_a_reason(client):
     for key in ("rpc/job_$*", "rpc/job_submit/**", "*/job_list"):
         replies = client.samples(key, b"{}")
         assert replies and all(isinstance(r, ErrorReply) and r.code == "rpc_wildcard" for r in replies), (key, replies)
-    assert client.rpc("job_list") == {"jobs": [], "older": 0}
+    assert client.rpc("job_list") == {"jobs": [], "older": 0, "removed": 0}
 
     made = submit(client, "one", examples=1)
     assert client.refused("job_submit", {"client_id": "one", "kind": "training", "examples": 2}).code == "job_conflict"
@@ -371,7 +371,8 @@ def test_an_unwritable_data_folder_costs_the_jobs_and_nothing_else(plicad, small
     log = tmp_path / "plicad.log"
     with running(plicad, small, log, data=tmp_path / "file" / "data") as daemon, Client(daemon.endpoint) as client:
         why = client.status()["jobs_unavailable"]
-        assert "file/data cannot be used" in why and "--data" in why, why
+        assert "the data folder cannot be used: Not a directory" in why and "--data" in why, why
+        assert str(tmp_path) not in why, "where the folder is stands in the log"
         for method, request in (("job_submit", {"client_id": "a", "kind": "training"}), ("job_list", {}),
                                 ("job_get", {"id": "0001"})):
             error = client.refused(method, request)
@@ -419,6 +420,7 @@ def test_a_full_disk_is_named_and_made_room_on(plicad, small, tmp_path, undistur
         print(f"\n{failed['reason']}")
         refused = client.refused("job_submit", {"client_id": "another", "kind": "training"})
         assert refused.code == "jobs_unavailable" and "No space left on device" in refused.body["message"], refused
+        assert (refused.body["retryable"], refused.body["done"]) == (True, "no"), "a full disk passes"
         os.remove(filler)
         client.rpc("job_resume", {"id": made["id"]})
         until(client, made["id"], "done")

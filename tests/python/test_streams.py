@@ -1,10 +1,12 @@
 """Poses in at 250 Hz, skin out at 1 kHz, wrenches out: every message is accounted for. Rates are not asserted."""
 
+import pathlib
 import time
 
 import numpy as np
 
-from client import Source, read_frame, read_wrench, wait_until
+from client import Client, Source, mesh_positions, read_frame, read_wrench, wait_until
+from conftest import Daemon
 
 SECONDS = 4
 POSE_HZ = 250
@@ -122,3 +124,40 @@ def test_status_is_published_and_names_everything(client):
     assert list(status["tools"]) == ["probe"] and list(status["objects"]) == ["wedge"]
     assert {"count", "min", "p50", "p90", "p99", "p999", "max"} <= set(status["tick_us"])
     assert "contact" in status["stages"]
+
+
+def test_both_formats_hold_the_same_skin_with_unit_normals(plicad, scene, tmp_path):
+    """The same press in f32 and in 16-bit offsets, each with normals: every field of this client's frames and wrenches."""
+    frames, wrenches = {}, {}
+    for name, publish in (("f32", 'format = "f32"'), ("i16", 'format = "i16"')):
+        text = (pathlib.Path(scene).read_text().replace('format = "f32"', publish)
+                .replace("normals = false", "normals = true"))
+        assert publish in text and "normals = true" in text
+        file = tmp_path / f"{name}.toml"
+        file.write_text(text)
+        running = Daemon(plicad, str(file), tmp_path / f"{name}.log", options=("--lock-step",))
+        try:
+            running.wait()
+            with Client(running.endpoint) as client:
+                heard = client.collect("tool/probe/wrench", read_wrench)
+                rest = mesh_positions(client.mesh())
+                pressed = {"tool": "probe", "position": [0.06, 0.03, 0.03], "orientation": [0, 0, 0, 1]}
+                client.rpc("step", {"ticks": 300, "poses": [pressed]})
+                frames[name] = client.frame()
+                wait_until(lambda: heard.messages() and heard.messages()[-1].n_contacts > 0, "a wrench with contact")
+                wrenches[name] = heard.messages()[-1]
+                heard.close()
+            running.stop()
+        finally:
+            running.kill()
+    exact, short = frames["f32"], frames["i16"]
+    moved = np.abs(exact.positions - rest).max()
+    error = np.abs(short.positions - exact.positions).max()
+    assert moved > 5e-4 and error <= 0.51 * moved / 32767 + 1e-7, (moved, error)
+    for frame in (exact, short):
+        assert np.allclose(np.linalg.norm(frame.normals, axis=1), 1, atol=1e-4)
+    assert np.abs(short.normals - exact.normals).max() < 1e-4
+    for wrench in wrenches.values():
+        assert wrench.force[2] > 0 and wrench.proxy_position[2] > 0.03, wrench
+        assert np.linalg.norm(wrench.contact_point - wrench.proxy_position) < 0.0075, "on the tool, a capsule of radius 7 mm"
+        assert abs(np.linalg.norm(wrench.proxy_orientation) - 1) < 1e-9

@@ -4,7 +4,10 @@ use std::time::Duration;
 
 use plica_protocol::chunk::ChunkHeader;
 use plica_protocol::keys::check_name;
-use plica_protocol::rpc::{ActivateReply, ActivateRequest, ErrorReply, Method, StepPose, StepReply, StepRequest};
+use plica_protocol::rpc::{
+    ActivateReply, ActivateRequest, Done, EmptyRequest, ErrorCode, ErrorReply, Method, StateReply, StepPose, StepReply,
+    StepRequest,
+};
 use plica_protocol::status::Status;
 use plica_protocol::{DecodeError, ENCODING_JSON};
 use serde::Serialize;
@@ -66,13 +69,30 @@ impl Client {
         parse_json(&key, &reply.payload().to_bytes())
     }
 
-    /// Lock-step: applies the poses, then runs the ticks. The daemon must be paused.
+    /// Lock-step: applies the poses, then runs the ticks. The daemon must be paused. A step that the daemon's limit of time cuts
+    /// into parts is continued.
     pub fn step(&self, ticks: u32, poses: Vec<StepPose>) -> Result<StepReply, ClientError> {
-        self.call("step", &StepRequest { ticks, poses })
+        let mut request = StepRequest { ticks, poses, from_tick: None };
+        loop {
+            let reply = self.call(Method::Step.name(), &request);
+            let rest = match &reply {
+                Err(ClientError::Refused(error)) => rest_of_step(&request, error),
+                _ => None,
+            };
+            request = match rest {
+                Some(rest) => rest,
+                None => return reply,
+            };
+        }
     }
 
-    /// Activates other examples: `database` is the id of a finished job, or a path on the daemon's machine. Takes seconds,
-    /// during which the simulation continues with the present examples.
+    /// Ends the step of another client or thread after its present tick, and returns the state.
+    pub fn interrupt(&self) -> Result<StateReply, ClientError> {
+        self.call(Method::Interrupt.name(), &EmptyRequest {})
+    }
+
+    /// Activates other examples: `database` is the id of a finished job, or the name of a file in the folder that the daemon was
+    /// started with (`--databases`). Takes seconds, during which the simulation continues with the present examples.
     pub fn activate(&self, database: &str) -> Result<ActivateReply, ClientError> {
         self.call(Method::Activate.name(), &ActivateRequest { database: database.to_owned() })
     }
@@ -136,6 +156,14 @@ impl Client {
             Err(_) => Err(ClientError::NoAnswer { place: self.place.clone(), key: key_of(selector) }),
         }
     }
+}
+
+/// The ticks that a step left when it reached its limit of time.
+fn rest_of_step(request: &StepRequest, error: &ErrorReply) -> Option<StepRequest> {
+    let out_of_time = error.code == ErrorCode::TimedOut.name() && error.done == Done::Partly;
+    let ticks_done = error.ticks_done.filter(|_| out_of_time)?;
+    let ticks = request.ticks.checked_sub(ticks_done).filter(|ticks| *ticks > 0 && ticks_done > 0)?;
+    Some(StepRequest { ticks, poses: Vec::new(), from_tick: error.tick })
 }
 
 fn accept(selector: &str, reply: Reply, timeout: Duration) -> Result<Sample, ClientError> {

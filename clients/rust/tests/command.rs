@@ -101,6 +101,7 @@ fn status_and_rpc_print_one_object() {
     let refused = &ask(&["rpc", "explode"])["error"];
     assert!(refused["message"].as_str().unwrap().starts_with("rpc_unknown: no method `explode`"), "{refused}");
     assert_eq!((&refused["code"], &refused["retryable"]), (&"rpc_unknown".into(), &false.into()));
+    assert_eq!(refused["done"], "no");
     assert!(ask(&["rpc", "step", "{ticks}"])["error"]["message"].as_str().unwrap().contains("is not JSON"));
 }
 

@@ -120,7 +120,7 @@ impl Bus {
         let Parts { session, ports_of_bus, keys, scene, model, enrichment, ports, grants, jobs } = parts;
         let Ports { poses, commands, frames, wrenches, readings, statistics } = ports;
         let counters = Arc::new(SharedCounters::default());
-        let intake = Arc::new(PoseIntake::new(&scene, poses));
+        let intake = Arc::new(PoseIntake::new(&scene, poses, Arc::clone(&statistics)));
         let stop = Arc::new(AtomicBool::new(false));
         let shared = Arc::new(Shared {
             session: session.clone(),

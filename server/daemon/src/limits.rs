@@ -1,5 +1,6 @@
 //! Size limits of the bus.
 
+pub use plica_protocol::rpc::{MAX_SNAPSHOTS, MAX_STEP_POSES};
 use plica_protocol::skin::{SkinFlags, SkinHeader};
 use plica_scene::Config;
 use plica_scene::scene::PositionFormat;

@@ -19,15 +19,15 @@ mod statistics;
 mod thread;
 mod waker;
 
-pub use command::{Command, Outcome, Refusal, Reply, Returned};
+pub use command::{Command, EarlyEnd, EarlyEndCause, Outcome, Refusal, Reply, Returned};
 pub use frame::{Frame, Reading, ToolFrame};
 pub use histogram::{AtomicHistogram, Summary};
 pub use pacing::{MAX_CATCH_UP, Pacer, Plan};
 pub use ports::{CommandPort, FramePort, Ports, WrenchPort};
 pub use privileges::{Grants, ThreadOptions};
-pub use sim_loop::{Loop, LoopOptions, MAX_STEP_POSES, Turn};
+pub use sim_loop::{Loop, LoopOptions, Turn};
 pub use stage_timer::{StageTimer, TurnProbe};
-pub use statistics::Statistics;
+pub use statistics::{SimTime, Statistics};
 pub use thread::{Pace, Running, spawn};
 pub use waker::Waker;
 

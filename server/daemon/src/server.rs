@@ -66,6 +66,7 @@ impl Server {
         let loop_options = LoopOptions { publish_hz: publish.publish_hz, wrench_hz: publish.wrench_hz, lock_step };
         let (mut core, ports) = Loop::new(Arc::clone(&model), loop_options);
         let enrichment = Enrichment::new(config, &model).map_err(EnrichmentError::from)?;
+        let enrichment = enrichment.with_folder(options.databases.as_deref())?;
         if let Some(database) = &config.enrichment().database {
             core.enrich(enrichment.live(&enrichment.read(database)?));
         }

@@ -2,13 +2,15 @@
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use plica_protocol::pose::Pose;
-use plica_protocol::rpc::{ActivateReply, ErrorCode, ErrorReply, SnapshotReply, StateReply, StepReply};
+use plica_protocol::rpc::{
+    ANSWER_WITHIN, ActivateReply, ErrorCode, ErrorReply, MAX_SNAPSHOTS, SnapshotReply, StateReply, StepReply,
+};
 use plica_protocol::skin::{SkinFlags, SkinHeader};
 use plica_protocol::status::{Distribution, ObjectStatus, Realtime, Scheduling, SolverStatus, ToolStatus};
 use plica_protocol::wrench::{Wrench, WrenchFlags};
 use plica_sim::{PoseSample, ToolReading};
 
-use crate::realtime::{Frame, Grants, Outcome, Reading, Refusal, Summary, ToolFrame};
+use crate::realtime::{EarlyEndCause, Frame, Grants, Outcome, Reading, Refusal, Summary, ToolFrame};
 
 /// A pose that has passed the protocol's gate.
 pub fn pose_sample(pose: &Pose) -> PoseSample {
@@ -110,6 +112,7 @@ pub fn object_status(reading: &Reading) -> ObjectStatus {
         sleeping: reading.report.sleeping,
         rollbacks: reading.rollbacks,
         enriched: reading.confidence.is_some(),
+        database_generation: reading.database_generation,
         confidence: reading.confidence.map(f64::from),
         max_penetration_m: reading.max_penetration_m.into(),
         dropped_contacts: reading.dropped_contacts,
@@ -128,14 +131,39 @@ pub fn realtime(grants: &Grants) -> Realtime {
     }
 }
 
-/// Reply of `reset`, `pause`, `resume`, `restore`.
+/// Reply of `reset`, `pause`, `resume`, `restore`, `interrupt`.
 pub fn state_reply(outcome: &Outcome) -> StateReply {
     StateReply { tick: outcome.tick, sim_time_s: outcome.sim_time_s, paused: outcome.paused }
 }
 
-/// Reply of `step`.
-pub fn step_reply(outcome: &Outcome) -> StepReply {
-    StepReply { tick: outcome.tick, sim_time_s: outcome.sim_time_s }
+/// Reply of a `step` of `ticks` ticks, or the error of one that stopped early.
+pub fn step_reply(outcome: &Outcome, ticks: u32) -> Result<StepReply, ErrorReply> {
+    let Some(early) = outcome.early else {
+        return Ok(StepReply { tick: outcome.tick, sim_time_s: outcome.sim_time_s });
+    };
+    let (tick, ticks_done) = (outcome.tick, ticks - early.ticks_left);
+    let reached =
+        format!("after {ticks_done} of {ticks} ticks, at tick {tick}; step again for the rest, without the poses");
+    let error = match early.cause {
+        EarlyEndCause::Interrupted => {
+            ErrorReply::new(ErrorCode::Interrupted, format!("rpc/interrupt ended the step {reached}"))
+        }
+        EarlyEndCause::Deadline => {
+            let limit_s = ANSWER_WITHIN.as_secs();
+            ErrorReply::new(ErrorCode::TimedOut, format!("the step reached its limit of {limit_s} s {reached}"))
+        }
+    };
+    Err(error.stopped_at(tick, ticks_done))
+}
+
+/// Error reply of a step that expects another tick.
+pub fn wrong_tick(present: &Outcome, from_tick: u64) -> ErrorReply {
+    let message = format!(
+        "the simulation is at tick {}, and from_tick is {from_tick}; nothing was done. If this repeats a step whose answer got \
+         lost, that step was carried out",
+        present.tick
+    );
+    ErrorReply { tick: Some(present.tick), ..ErrorReply::new(ErrorCode::WrongTick, message) }
 }
 
 /// Reply of `snapshot`.
@@ -155,13 +183,15 @@ pub fn activate_reply(outcome: &Outcome, n_examples: usize) -> ActivateReply {
 /// Error reply of a refused command.
 pub fn refusal(refusal: Refusal) -> ErrorReply {
     let (code, message) = match refusal {
-        Refusal::NotPaused => (ErrorCode::NotPaused, "step needs a paused simulation; call rpc/pause first"),
+        Refusal::NotPaused => (ErrorCode::NotPaused, "step needs a paused simulation; call rpc/pause first".to_owned()),
         Refusal::LockStep => (
             ErrorCode::RpcMalformed,
-            "this daemon runs in lock-step and moves by rpc/step only; start it without --lock-step",
+            "this daemon runs in lock-step and moves by rpc/step only; start it without --lock-step".to_owned(),
         ),
-        Refusal::UnknownSnapshot => (ErrorCode::UnknownSnapshot, "no snapshot of that id; the last 8 are kept"),
-        Refusal::Busy => (ErrorCode::Busy, "steps of an earlier request are still running"),
+        Refusal::UnknownSnapshot => {
+            (ErrorCode::UnknownSnapshot, format!("no snapshot of that id; the last {MAX_SNAPSHOTS} are kept"))
+        }
+        Refusal::Busy => (ErrorCode::Busy, "steps of an earlier request are still running".to_owned()),
     };
     ErrorReply::new(code, message)
 }

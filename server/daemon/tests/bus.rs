@@ -85,6 +85,36 @@ fn key_paths(value: &Value, path: &str) -> BTreeSet<String> {
 }
 
 #[test]
+fn the_protocol_names_the_stages_in_the_order_of_a_tick() {
+    assert_eq!(plica_client::protocol::status::STAGES, plica_sim::Stage::ALL.map(plica_sim::Stage::name));
+}
+
+#[test]
+fn a_whole_step_comes_in_parts_where_the_daemon_limits_it_and_an_interrupt_ends_it() {
+    let server = TestServer::start(true);
+    let client = server.client();
+    // Pressed, so that no tick is skipped asleep.
+    client.step(1, vec![StepPose::new("ball", &pose(1, 1, 0.023))]).unwrap();
+    let stepping = std::thread::spawn({
+        let client = server.client();
+        move || (0..).map(|_| client.step(10_000, Vec::new())).find_map(Result::err).unwrap()
+    });
+    wait_for("ticks", || client.status().unwrap().tick > 10);
+    let mut state = client.interrupt().unwrap();
+    wait_for("the end of the step", || {
+        state = client.interrupt().unwrap();
+        stepping.is_finished()
+    });
+    let ClientError::Refused(error) = stepping.join().unwrap() else { panic!("not refused") };
+    assert_eq!(
+        (error.code.as_str(), error.tick, error.retryable),
+        ("interrupted", Some(state.tick), false),
+        "{error:?}"
+    );
+    assert_eq!(client.interrupt().unwrap(), state);
+}
+
+#[test]
 fn lock_step_over_the_bus_gives_the_bytes_of_a_replay() {
     let server = TestServer::start(true);
     let client = server.client();

@@ -12,12 +12,12 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// The file cannot be created or written.
-    #[error("cannot write {}: {source}", path.display())]
+    #[error("cannot write {}: {cause}", path.display())]
     Write {
         /// The file.
         path: PathBuf,
         /// Cause.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// A field does not hold one value per node or hexahedron.
     #[error("field `{name}` holds {n_values} values for {n_expected} {of}")]
@@ -37,5 +37,5 @@ pub enum ExportError {
 }
 
 fn write_file(path: &Path, bytes: &[u8]) -> Result<(), ExportError> {
-    std::fs::write(path, bytes).map_err(|source| ExportError::Write { path: path.to_owned(), source })
+    std::fs::write(path, bytes).map_err(|cause| ExportError::Write { path: path.to_owned(), cause })
 }

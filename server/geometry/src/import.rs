@@ -4,62 +4,66 @@
 //! appended VTU data, and end the program on a truncated file. A file of any bytes gives a mesh or an [`ImportError`].
 
 mod assemble;
+mod check;
 mod error;
 mod groups;
+mod merge;
 mod msh;
+mod named_mesh;
 mod obj;
+mod options;
+mod text;
 mod vtu;
 
 use std::path::Path;
 
-use crate::hex_mesh::HexMesh;
 pub use error::{ImportError, Place};
 pub use groups::{Group, Groups};
-pub use obj::read_obj_parts;
+pub use named_mesh::NamedMesh;
+pub use obj::{ObjPart, parse_obj_parts};
+pub use options::ReadOptions;
 
 use error::{Fault, fault};
 
-/// Mesh with the named groups of its file.
-#[derive(Clone, Debug)]
-pub struct NamedMesh {
-    /// Nodes \[m\] and hexahedra, in the order of the file; nodes that no hexahedron uses are left out.
-    pub mesh: HexMesh,
-    /// Named parts.
-    pub groups: Groups,
-}
-
-/// Reads a `.vtu` or `.msh` file of 8-node hexahedra whose unit of length is `metres_per_unit` \[m\].
+/// Reads a `.vtu` or `.msh` file of 8-node hexahedra.
 ///
 /// Groups are the physical groups of Gmsh, by name or, without one, by number. In a VTU file a cell array with at most 256
 /// different values makes a group `NAME=VALUE` of each, and so does a point array, of nodes. Cells of lower dimension (points,
 /// lines, triangles, quads) lend their nodes to groups; quads that are faces of hexahedra are faces of the group too.
 ///
 /// # Errors
-/// [`ImportError`]: a file that cannot be read, is damaged, or holds other volumes than 8-node hexahedra.
-pub fn read_mesh(path: &Path, metres_per_unit: f64) -> Result<NamedMesh, ImportError> {
+/// [`ImportError`]: a file that cannot be read, is damaged, holds other volumes than 8-node hexahedra, or has parts that touch
+/// without sharing nodes.
+pub fn read_mesh(path: &Path, options: ReadOptions) -> Result<NamedMesh, ImportError> {
     let bytes = std::fs::read(path).map_err(|e| {
         let problem = format!("cannot be read: {e}");
         ImportError::new(path, Fault::new(Place::File, problem, "check the path of the mesh file"))
     })?;
-    parse_mesh(path, &bytes, metres_per_unit)
+    parse_mesh(path, &bytes, options)
 }
 
 /// [`read_mesh`] on the bytes of a file; `path` appears in messages only.
 ///
 /// # Errors
 /// As [`read_mesh`].
-pub fn parse_mesh(path: &Path, bytes: &[u8], metres_per_unit: f64) -> Result<NamedMesh, ImportError> {
-    parse(bytes, metres_per_unit).map_err(|fault| ImportError::new(path, fault))
+pub fn parse_mesh(path: &Path, bytes: &[u8], options: ReadOptions) -> Result<NamedMesh, ImportError> {
+    parse(bytes, &options).map_err(|fault| ImportError::new(path, fault))
 }
 
-fn parse(bytes: &[u8], metres_per_unit: f64) -> Result<NamedMesh, Fault> {
-    if !(metres_per_unit.is_finite() && metres_per_unit > 0.0) {
-        return fault(Place::File, format!("{metres_per_unit} metres per unit"), "give a positive number: 1e-3 for mm");
+fn parse(bytes: &[u8], options: &ReadOptions) -> Result<NamedMesh, Fault> {
+    let unit = options.metres_per_unit;
+    if !(unit.is_finite() && unit > 0.0) {
+        return fault(Place::File, format!("{unit} metres per unit"), "give a positive number: 1e-3 for mm");
     }
+    let bytes = text::without_mark(bytes);
     let content = match bytes.trim_ascii_start() {
-        text if text.starts_with(b"$") => msh::parse(bytes)?,
-        text if text.starts_with(b"<") => vtu::parse(bytes)?,
+        text if text.starts_with(b"<") => vtu::parse(&bytes)?,
+        text if msh::is_msh(text) => msh::parse(&bytes)?,
         _ => return fault(Place::File, "is neither a Gmsh (.msh) nor a VTU (.vtu) file", error::CONVERT),
     };
-    content.assemble(metres_per_unit)
+    let (content, merged) = merge::merge(content, options)?;
+    let mut named = content.assemble(unit)?;
+    named.remarks = merged;
+    check::joints(&mut named, options)?;
+    Ok(named)
 }

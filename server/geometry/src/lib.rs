@@ -6,6 +6,7 @@
 mod box_tree;
 mod clusters;
 mod convex_polytope;
+mod convexity;
 mod display_surface;
 mod embedding;
 mod exponential_map;
@@ -14,6 +15,7 @@ mod hex_mesh;
 pub mod import;
 mod index;
 pub mod isoparametric;
+pub mod joints;
 mod locate;
 mod neighbourhood;
 pub mod predicate;
@@ -21,9 +23,11 @@ mod reference_skin;
 pub mod select;
 pub mod shapes;
 mod skin;
+mod triangle;
 
 pub use clusters::CLUSTER_SIZE;
 pub use convex_polytope::{ConvexPolytope, FaceDistance, FacePlane, HullError};
+pub use convexity::hull_stand_off;
 pub use display_surface::{DisplaySurface, vertex_normals_into};
 pub use embedding::{DEFAULT_SUPPORT_CELLS, Embedding, EmbeddingError, EmbeddingKind, MAX_OUTSIDE_CELLS};
 pub use exponential_map::{ExponentialMaps, Mapped};

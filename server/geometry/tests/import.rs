@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use common::{Random, centre, default_wedge};
 use nalgebra::Point3;
 use plica_geometry::export::{Field, write_vtu};
-use plica_geometry::import::{ImportError, NamedMesh, parse_mesh, read_mesh};
+use plica_geometry::import::{ImportError, NamedMesh, ReadOptions, parse_mesh, read_mesh};
 use plica_geometry::{HexIdx, NodeIdx};
 
 const MILLIMETRES: f64 = 1e-3;
@@ -28,13 +28,13 @@ fn files(begin: &str, end: &str) -> Vec<String> {
 }
 
 fn refusal(name: &str) -> String {
-    let error = read_mesh(&data(name), MILLIMETRES).unwrap_err();
+    let error = read_mesh(&data(name), ReadOptions::unit(MILLIMETRES)).unwrap_err();
     assert_eq!(error.path, data(name));
     error.to_string()
 }
 
 fn parse(text: &str) -> Result<NamedMesh, ImportError> {
-    parse_mesh(Path::new("a.mesh"), text.as_bytes(), 1.0)
+    parse_mesh(Path::new("a.mesh"), text.as_bytes(), ReadOptions::unit(1.0))
 }
 
 /// Nodes as whole millimetres, in increasing order.
@@ -65,7 +65,7 @@ fn gmsh_files_of_every_kind_give_the_same_mesh_and_groups() {
     let names = files("boxes", ".msh");
     assert_eq!(names.len(), 5, "{names:?}");
     for name in names {
-        let read = read_mesh(&data(&name), MILLIMETRES).unwrap();
+        let read = read_mesh(&data(&name), ReadOptions::unit(MILLIMETRES)).unwrap();
         check_boxes(&read);
         let groups = &read.groups;
         assert_eq!(groups.volume("soft").unwrap().hexes, hexes_where(&read, |c| c.x < 0.01), "{name}");
@@ -84,7 +84,7 @@ fn gmsh_files_of_every_kind_give_the_same_mesh_and_groups() {
 
 #[test]
 fn faces_of_a_surface_are_boundary_quads() {
-    let read = read_mesh(&data("boxes-4.1-ascii.msh"), MILLIMETRES).unwrap();
+    let read = read_mesh(&data("boxes-4.1-ascii.msh"), ReadOptions::unit(MILLIMETRES)).unwrap();
     let mut boundary = read.mesh.boundary_quads();
     boundary.iter_mut().for_each(|quad| quad.sort_unstable());
     for name in ["bottom", "end", "77"] {
@@ -97,7 +97,7 @@ fn vtu_files_of_every_kind_give_the_same_mesh_and_groups() {
     let names = files("boxes-a", ".vtu").into_iter().chain(files("boxes-b", ".vtu")).collect::<Vec<_>>();
     assert_eq!(names.len(), 7, "{names:?}");
     for name in names {
-        let read = read_mesh(&data(&name), MILLIMETRES).unwrap_or_else(|e| panic!("{e}"));
+        let read = read_mesh(&data(&name), ReadOptions::unit(MILLIMETRES)).unwrap_or_else(|e| panic!("{e}"));
         check_boxes(&read);
         let groups = &read.groups;
         assert_eq!(groups.volume("material=1").unwrap().hexes, hexes_where(&read, |c| c.x < 0.01), "{name}");
@@ -115,7 +115,7 @@ fn what_is_written_is_read_back() {
     let path = folder.path().join("wedge.vtu");
     let region: Vec<f64> = mesh.hex_indices().map(|hex| f64::from(u8::from(centre(&mesh, hex).x > 0.06))).collect();
     write_vtu(&path, &mesh, &[], &[Field::Scalars("region", &region)]).unwrap();
-    let read = read_mesh(&path, 1.0).unwrap();
+    let read = read_mesh(&path, ReadOptions::unit(1.0)).unwrap();
     assert_eq!(read.mesh, mesh);
     assert_eq!(read.groups.volume("region=1").unwrap().hexes, hexes_where(&read, |c| c.x > 0.06));
 }
@@ -139,7 +139,7 @@ fn other_elements_are_refused_by_name() {
 fn a_surface_is_told_to_be_one() {
     let liver = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/meshes/liver.obj");
     if liver.exists() {
-        let message = read_mesh(&liver, 1.0).unwrap_err().to_string();
+        let message = read_mesh(&liver, ReadOptions::unit(1.0)).unwrap_err().to_string();
         assert!(message.contains("neither a Gmsh (.msh) nor a VTU"), "{message}");
     } else {
         println!("skipped in part: no test meshes beside the repository");
@@ -218,7 +218,7 @@ fn a_hexahedron_of_two_groups_is_one() {
 #[test]
 fn units_must_be_a_length() {
     for unit in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let message = read_mesh(&data("boxes-ascii.vtu"), unit).unwrap_err().to_string();
+        let message = read_mesh(&data("boxes-ascii.vtu"), ReadOptions::unit(unit)).unwrap_err().to_string();
         assert!(message.contains("metres per unit"), "{message}");
     }
 }
@@ -228,7 +228,9 @@ fn units_must_be_a_length() {
 fn truncated_files_end_in_an_error() {
     for name in files("", ".msh").into_iter().chain(files("", ".vtu")) {
         let bytes = std::fs::read(data(&name)).unwrap();
-        let n_read = (0..bytes.len()).filter(|&n| parse_mesh(Path::new(&name), &bytes[..n], 1.0).is_ok()).count();
+        let n_read = (0..bytes.len())
+            .filter(|&n| parse_mesh(Path::new(&name), &bytes[..n], ReadOptions::unit(1.0)).is_ok())
+            .count();
         assert!(n_read < 40, "{name}: {n_read} truncated files were read");
     }
 }
@@ -251,13 +253,13 @@ fn damaged_files_end_in_an_answer() {
                     _ => bytes.insert(at, b'9'),
                 }
             }
-            let _ = parse_mesh(Path::new(&name), &bytes, 1.0);
+            let _ = parse_mesh(Path::new(&name), &bytes, ReadOptions::unit(1.0));
         }
     }
     for length in 0..300 {
         let begin = ["$MeshFormat\n2.2 1 8\n", "$MeshFormat\n4.1 1 8\n", "<VTKFile", ""][length % 4];
         let bytes: Vec<u8> = begin.bytes().chain((0..length).map(|_| below(256) as u8)).collect();
-        assert!(parse_mesh(Path::new("noise"), &bytes, 1.0).is_err());
+        assert!(parse_mesh(Path::new("noise"), &bytes, ReadOptions::unit(1.0)).is_err());
     }
 }
 

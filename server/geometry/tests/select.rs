@@ -8,7 +8,7 @@ use std::path::Path;
 use common::default_wedge;
 use nalgebra::Point3;
 use plica_geometry::HexIdx;
-use plica_geometry::import::{Groups, NamedMesh, read_mesh};
+use plica_geometry::import::{Groups, NamedMesh, ReadOptions, read_mesh};
 use plica_geometry::predicate::Predicate;
 use plica_geometry::select::{SelectError, Selector, Side};
 use plica_geometry::shapes::{Hexahedron, block, hexahedron, wedge};
@@ -120,7 +120,7 @@ fn sides_boxes_and_conditions_select_together() {
 }
 
 fn boxes(file: &str) -> NamedMesh {
-    read_mesh(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file), 1e-3).unwrap()
+    read_mesh(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file), ReadOptions::unit(1e-3)).unwrap()
 }
 
 fn group(name: &str) -> Selector {
@@ -129,7 +129,7 @@ fn group(name: &str) -> Selector {
 
 #[test]
 fn groups_select_nodes_faces_and_hexahedra() {
-    let NamedMesh { mesh, groups } = boxes("boxes-4.1-ascii.msh");
+    let NamedMesh { mesh, groups, .. } = boxes("boxes-4.1-ascii.msh");
     assert_eq!(group("bottom").nodes(&mesh, &groups).unwrap().len(), 15);
     assert_eq!(group("bottom").faces(&mesh, &groups).unwrap().len(), 8);
     assert_eq!(group("soft").hexes(&mesh, &groups).unwrap().len(), 8);
@@ -141,7 +141,7 @@ fn groups_select_nodes_faces_and_hexahedra() {
     let error = group("bottom").hexes(&mesh, &groups).unwrap_err().to_string();
     assert_eq!(error, "group `bottom` has no hexahedra: it is a group of faces");
     assert_eq!(group("edge").faces(&mesh, &groups), Err(SelectError::Empty { n: 40, of: "boundary faces" }));
-    let NamedMesh { mesh, groups } = boxes("boxes-appended-raw.vtu");
+    let NamedMesh { mesh, groups, .. } = boxes("boxes-appended-raw.vtu");
     assert_eq!(group("fixed=1").faces(&mesh, &groups).unwrap().len(), 8, "faces with all corners in a group of points");
 }
 

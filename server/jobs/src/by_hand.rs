@@ -5,12 +5,14 @@ use std::path::{Component, Path, PathBuf};
 
 use plica_protocol::jobs::JobState;
 use plica_scene::Config;
-use plica_scene::scene::SceneFile;
+use plica_scene::scene::{MAX_FILE_BYTES, SceneFile};
 use plica_training::{
-    DatabaseKind, TrainingError, TrainingFolder, TrainingJob, TrainingReport, Writer, now_unix_s, write_atomically,
+    DatabaseKind, RegularFile, TrainingError, TrainingFolder, TrainingJob, TrainingReport, Writer, now_unix_s,
+    write_atomically,
 };
 
 use crate::folder::{JobFolder, StoredStatus};
+use crate::sentence::sentence;
 
 /// Options of a job on the command line.
 #[derive(Debug, Clone, Copy)]
@@ -83,7 +85,8 @@ fn bring(root: &Path, file: &SceneFile, text: String) -> Result<String, FolderEr
     if typed.components().all(|c| matches!(c, Component::Normal(_))) {
         let copy = root.join(typed);
         fs::create_dir_all(copy.parent().unwrap_or(root)).map_err(at(&copy))?;
-        let bytes = fs::read(&file.path).map_err(at(&file.path))?;
+        let read = RegularFile::open(&file.path, MAX_FILE_BYTES).and_then(RegularFile::read);
+        let bytes = read.map_err(|fault| at(&file.path)(std::io::Error::other(fault)))?;
         write_atomically(&copy, &bytes).map_err(at(&copy))?;
         return Ok(text);
     }
@@ -110,7 +113,7 @@ pub fn end(root: &Path, started: StoredStatus, result: &anyhow::Result<TrainingR
         Ok(_) => (JobState::Done, None),
         Err(error) => match error.downcast_ref() {
             Some(TrainingError::Interrupted) => (JobState::Paused, Some("interrupted".to_owned())),
-            _ => (JobState::Failed, Some(format!("{error:#}"))),
+            _ => (JobState::Failed, Some(sentence(error))),
         },
     };
     write(root, &StoredStatus { state, reason, finished_unix_s: Some(now_unix_s()), pid: None, ..started })

@@ -47,6 +47,18 @@ struct Owner {
     started_unix_s: u64,
 }
 
+impl DataFolderError {
+    /// The error for clients, who are not told where the folder is.
+    pub fn without_place(&self) -> String {
+        match self {
+            Self::Locked { .. } => "the data folder is in use by another plicad".to_owned(),
+            Self::Unusable { problem, .. } => format!(
+                "the data folder cannot be used: {problem}; make it writable, or start plicad with another one (--data)"
+            ),
+        }
+    }
+}
+
 impl DataFolder {
     /// Locks the folder; makes it if it does not exist.
     pub fn open(path: &Path, session: &str) -> Result<Self, DataFolderError> {
@@ -100,7 +112,7 @@ fn sign(lock: &mut File, session: &str) -> io::Result<()> {
 
 fn owner(lock: &mut File) -> String {
     let mut text = String::new();
-    let read = lock.read_to_string(&mut text).ok().and_then(|_| serde_json::from_str::<Owner>(&text).ok());
+    let read = lock.take(4096).read_to_string(&mut text).ok().and_then(|_| serde_json::from_str::<Owner>(&text).ok());
     read.map_or_else(String::new, |o| format!(" (process {}, session `{}`)", o.pid, o.session))
 }
 

@@ -12,6 +12,22 @@ pub enum JobError {
     /// A job cannot be written to disk.
     #[error("the job cannot be stored: {0}")]
     Disk(String),
+    /// A result cannot be read.
+    #[error("the result {0}")]
+    Result(String),
+    /// The job had this id, and was removed.
+    #[error("no job `{0}` any more: the daemon keeps a limited number of finished jobs (--keep-jobs, --keep-bytes)")]
+    Removed(String),
+    /// Unfinished jobs fill the room for jobs.
+    #[error(
+        "the jobs that are not over have {bytes} bytes with this one; at most {most} are kept; cancel some, or wait until some are over"
+    )]
+    NoRoom {
+        /// Bytes of all of them.
+        bytes: u64,
+        /// Bound of the data folder's jobs.
+        most: u64,
+    },
     /// No job has this id.
     #[error("no job `{0}`; `job_list` names them")]
     Unknown(String),
@@ -69,11 +85,11 @@ fn name_of(file: JobFile) -> &'static str {
 impl JobError {
     fn code(&self) -> ErrorCode {
         match self {
-            Self::Unavailable(_) | Self::Disk(_) => ErrorCode::JobsUnavailable,
-            Self::Unknown(_) => ErrorCode::UnknownJob,
+            Self::Unavailable(_) | Self::Disk(_) | Self::Result(_) => ErrorCode::JobsUnavailable,
+            Self::Unknown(_) | Self::Removed(_) => ErrorCode::UnknownJob,
             Self::Conflict { .. } => ErrorCode::JobConflict,
             Self::Over { .. } | Self::NotResumable { .. } | Self::NotDone { .. } => ErrorCode::JobState,
-            Self::TooMany(_) => ErrorCode::TooManyJobs,
+            Self::TooMany(_) | Self::NoRoom { .. } => ErrorCode::TooManyJobs,
             Self::Scene(_) => ErrorCode::BadScene,
         }
     }
@@ -81,6 +97,8 @@ impl JobError {
 
 impl From<JobError> for ErrorReply {
     fn from(error: JobError) -> Self {
-        Self::new(error.code(), error.to_string())
+        let passes = matches!(error, JobError::Disk(_));
+        let reply = Self::new(error.code(), error.to_string());
+        if passes { reply.nothing_done_yet() } else { reply }
     }
 }

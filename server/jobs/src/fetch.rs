@@ -9,9 +9,15 @@ use std::time::SystemTime;
 
 use plica_protocol::chunk::{CHUNK_BYTES, ChunkHeader, check_offset};
 use plica_protocol::rpc::ErrorReply;
+use plica_training::RegularFile;
 use sha2::{Digest, Sha256};
 
 use crate::error::JobError;
+
+/// Largest result that is handed out.
+const MAX_RESULT_BYTES: u64 = 1 << 40;
+/// Checksums that are remembered.
+const MAX_SUMS: usize = 1024;
 
 /// Checksums of files, computed once for each size and time of modification.
 #[derive(Debug, Default)]
@@ -27,11 +33,13 @@ struct Sum {
 impl Sums {
     /// Chunk of a file from `offset` on.
     pub(crate) fn piece(&self, path: &Path, offset: u64) -> Result<(ChunkHeader, Vec<u8>), ErrorReply> {
-        let failed = |e: io::Error| JobError::Disk(format!("{} cannot be read: {e}", path.display()));
-        let mut file = File::open(path).map_err(failed)?;
-        let Sum { bytes, sha256, .. } = self.of(&mut file, path).map_err(failed)?;
+        let failed = |e: io::Error| JobError::Result(format!("cannot be read: {e}"));
+        let open = RegularFile::open_unlinked(path, MAX_RESULT_BYTES);
+        let mut open = open.map_err(|fault| JobError::Result(fault.to_string()))?;
+        let file = open.file();
+        let Sum { bytes, sha256, .. } = self.of(file, path).map_err(failed)?;
         check_offset(offset, bytes)?;
-        let piece = read(&mut file, offset).map_err(failed)?;
+        let piece = read(file, offset).map_err(failed)?;
         Ok((ChunkHeader { total_bytes: bytes, offset, sha256 }, piece))
     }
 
@@ -42,13 +50,17 @@ impl Sums {
         if let Some(sum) = sums.get(path).filter(|sum| (sum.bytes, sum.modified) == (bytes, modified)) {
             return Ok(sum.clone());
         }
-        let sum = Sum { bytes, modified, sha256: sha256(file)? };
+        let sum = Sum { bytes, modified, sha256: sha256(file, bytes)? };
+        if sums.len() >= MAX_SUMS {
+            sums.clear();
+        }
         sums.insert(path.to_owned(), sum.clone());
         Ok(sum)
     }
 }
 
-fn sha256(file: &mut File) -> io::Result<String> {
+fn sha256(file: &mut File, bytes: u64) -> io::Result<String> {
+    let mut file = file.take(bytes);
     let (mut hash, mut buffer) = (Sha256::new(), vec![0; CHUNK_BYTES]);
     loop {
         match file.read(&mut buffer)? {

@@ -7,7 +7,9 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use plica_protocol::jobs::{JobFile, JobState};
-use plica_training::{JobPaths, TrainingJob, TrainingProgress, TrainingStage, write_json_atomically};
+use plica_training::{
+    JobPaths, MAX_RECORD_BYTES, RegularFile, TrainingJob, TrainingProgress, TrainingStage, write_json_atomically,
+};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -109,13 +111,25 @@ impl JobFolder {
 
     /// Whether a process holds the folder's lock: one started by hand, or one that is still ending.
     pub fn is_busy(&self) -> bool {
-        let lock = fs::File::open(self.0.lock());
-        lock.is_ok_and(|lock| matches!(lock.try_lock(), Err(fs::TryLockError::WouldBlock)))
+        let lock = RegularFile::open_unlinked(&self.0.lock(), u64::MAX);
+        lock.is_ok_and(|mut lock| matches!(lock.file().try_lock(), Err(fs::TryLockError::WouldBlock)))
+    }
+
+    /// Sentence for clients, who are not told where the folder is.
+    pub fn without_place(&self, sentence: &str) -> String {
+        let place = self.path().display().to_string();
+        sentence.replace(&format!("{place}/"), "").replace(&place, "the job's folder")
+    }
+
+    /// Bytes of all files in the folder.
+    pub(crate) fn bytes(&self) -> u64 {
+        bytes_below(self.path())
     }
 
     /// Last line of the log that is not blank.
     pub fn last_log_line(&self) -> Option<String> {
-        let mut file = fs::File::open(self.log()).ok()?;
+        let mut log = RegularFile::open_unlinked(&self.log(), u64::MAX).ok()?;
+        let file = log.file();
         let length = file.seek(SeekFrom::End(0)).ok()?;
         file.seek(SeekFrom::Start(length.saturating_sub(TAIL_BYTES))).ok()?;
         let mut tail = Vec::new();
@@ -124,9 +138,19 @@ impl JobFolder {
     }
 }
 
+fn bytes_below(folder: &Path) -> u64 {
+    let bytes = |entry: fs::DirEntry| match entry.metadata() {
+        Ok(metadata) if metadata.is_dir() => bytes_below(&entry.path()),
+        Ok(metadata) => metadata.len(),
+        Err(_) => 0,
+    };
+    fs::read_dir(folder).into_iter().flatten().flatten().map(bytes).sum()
+}
+
 /// Reads a JSON file; the error is a sentence that names it.
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, String> {
-    let text = fs::read(path).map_err(|e| format!("{} cannot be read: {e}", path.display()))?;
+    let read = RegularFile::open_unlinked(path, MAX_RECORD_BYTES).and_then(RegularFile::read);
+    let text = read.map_err(|fault| format!("{} {fault}", path.display()))?;
     serde_json::from_slice(&text).map_err(|e| format!("{} is not what it should be: {e}", path.display()))
 }
 
@@ -174,6 +198,25 @@ mod tests {
         assert_eq!((progress.done, progress.rejected, progress.total), (2, 1, 8), "what is on disk");
         assert!(job.job().unwrap_err().contains("job.json cannot be read"));
         assert_eq!(job.last_log_line(), None);
+    }
+
+    #[test]
+    fn a_pipe_or_a_device_in_place_of_a_file_is_told_and_blocks_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let job = JobFolder::new(folder.path().to_owned());
+        let paths = job.paths();
+        for path in [paths.job(), paths.state(), paths.progress(), paths.log(), paths.lock()] {
+            assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+        }
+        assert!(job.job().unwrap_err().contains("job.json is no regular file"));
+        assert!(job.status().unwrap_err().contains("state.json is no regular file"));
+        assert!(job.progress().is_none() && job.last_log_line().is_none() && !job.is_busy());
+        fs::remove_file(paths.state()).unwrap();
+        std::os::unix::fs::symlink("/dev/zero", paths.state()).unwrap();
+        assert!(job.status().unwrap_err().contains("state.json is a link"));
+        fs::remove_file(paths.state()).unwrap();
+        fs::File::create(paths.state()).unwrap().set_len(1 << 40).unwrap();
+        assert!(job.status().unwrap_err().contains("state.json has 1099511627776 bytes; at most 1048576 are read"));
     }
 
     #[test]

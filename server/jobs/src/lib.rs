@@ -8,11 +8,13 @@ mod data_folder;
 mod error;
 mod fetch;
 mod folder;
+mod keep;
 mod priority;
 mod process;
 mod reason;
 mod recover;
 mod scene;
+mod sentence;
 mod store;
 mod submit;
 mod supervisor;
@@ -28,14 +30,16 @@ use plica_protocol::jobs::{
     Job, JobFetchRequest, JobFile, JobListReply, JobState, JobStatus, JobSubmitReply, JobSubmitRequest, MAX_IN_STATUS,
 };
 use plica_protocol::rpc::ErrorReply;
-use plica_training::now_unix_s;
+use plica_training::{MAX_DATABASE_BYTES, RegularFile, now_unix_s};
 
 pub use data_folder::{DataFolder, DataFolderError, default_path};
 pub use error::JobError;
 pub use folder::{JobFolder, StoredStatus};
+pub use keep::Keep;
 pub use priority::{Priority, lower};
 pub use process::Launch;
 pub use scene::ServedScene;
+pub use sentence::sentence;
 
 use fetch::Sums;
 use store::Store;
@@ -50,6 +54,7 @@ struct Shared {
     store: Arc<Store>,
     sums: Sums,
     served: ServedScene,
+    keep: Keep,
     supervisor: std::thread::Thread,
     /// Held during a submission: incomplete ones share a folder.
     submitting: Mutex<()>,
@@ -70,13 +75,18 @@ impl Jobs {
     }
 
     /// Reads the jobs of `folder` and starts the thread that runs them.
-    pub fn start(folder: DataFolder, served: ServedScene, launch: Launch) -> std::io::Result<(Self, Supervision)> {
+    pub fn start(
+        folder: DataFolder,
+        served: ServedScene,
+        launch: Launch,
+        keep: Keep,
+    ) -> std::io::Result<(Self, Supervision)> {
         let store = Arc::new(recover::recover(&folder.jobs())?);
         let stop = Arc::new(AtomicBool::new(false));
-        let supervisor = Supervisor::new(Arc::clone(&store), launch, Arc::clone(&stop));
+        let supervisor = Supervisor::new(Arc::clone(&store), launch, Arc::clone(&stop), keep);
         let thread = std::thread::Builder::new().name("plica-supervise".into()).spawn(move || supervisor.run())?;
         let (sums, supervisor) = (Sums::default(), thread.thread().clone());
-        let shared = Shared { store, sums, served, supervisor, submitting: Mutex::new(()) };
+        let shared = Shared { store, sums, served, keep, supervisor, submitting: Mutex::new(()) };
         let supervision = Supervision { stop, thread: Some(thread), _folder: folder };
         Ok((Self(Ok(Arc::new(shared))), supervision))
     }
@@ -91,7 +101,9 @@ impl Jobs {
         request.check()?;
         let shared = self.shared()?;
         let _alone = shared.submitting.lock().unwrap_or_else(PoisonError::into_inner);
-        let reply = submit::submit(&shared.store, request, &shared.served)?;
+        // Here too, since jobs may come faster than the other thread removes them.
+        keep::prune(&shared.store, shared.keep);
+        let reply = submit::submit(&shared.store, request, &shared.served, shared.keep)?;
         shared.supervisor.unpark();
         Ok(reply)
     }
@@ -146,6 +158,22 @@ impl Jobs {
             return Err(JobError::NotDone { id: id.to_owned(), state, file });
         }
         Ok(entry.folder.result(file))
+    }
+
+    /// Database of a finished job, open; the job is kept until [`Jobs::end_use`].
+    pub fn begin_use(&self, id: &str) -> Result<RegularFile, JobError> {
+        let store = &self.shared()?.store;
+        store.begin_use(store.find(id)?);
+        let path = self.result(id, JobFile::Database)?;
+        RegularFile::open_unlinked(&path, MAX_DATABASE_BYTES).map_err(|fault| JobError::Result(fault.to_string()))
+    }
+
+    /// Ends the use of a database: its examples enrich the skin from now on, and its job is kept, or they do not. To be
+    /// called for databases of no job, too.
+    pub fn end_use(&self, enriches: bool) {
+        if let Ok(shared) = &self.0 {
+            shared.store.end_use(enriches);
+        }
     }
 
     /// Present version of the table, and the jobs changed since `version` (0: all jobs).

@@ -3,12 +3,14 @@
 //! It is started through `plicad child`, which lowers its own priority and then executes the job. Nothing runs between fork and
 //! exec, since a fork marks every page of the daemon for copying, and the simulation thread would fault on each.
 
-use std::fs::OpenOptions;
+use std::fs::{File, OpenOptions};
 use std::io;
-use std::path::PathBuf;
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
+use rustix::fs::OFlags;
 use rustix::process::{Pid, Signal, kill_process_group};
 
 use crate::folder::JobFolder;
@@ -60,8 +62,7 @@ pub(crate) struct Process {
 impl Process {
     /// Starts the process of a job as the leader of a process group; the error is a sentence.
     pub(crate) fn start(launch: &Launch, folder: &JobFolder) -> Result<Self, String> {
-        let log = OpenOptions::new().append(true).create(true).open(folder.log());
-        let log = log.map_err(|e| format!("{} cannot be written: {e}", folder.log().display()))?;
+        let log = open_log(&folder.log()).map_err(|e| format!("{} cannot be written: {e}", folder.log().display()))?;
         let for_errors = log.try_clone().map_err(|e| format!("{}: {e}", folder.log().display()))?;
         let mut command = launch.command();
         command.args(["train", "--job"]).arg(folder.path());
@@ -69,7 +70,10 @@ impl Process {
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let child = command.spawn();
-        let child = child.map_err(|e| format!("{} cannot be started: {e}", command.get_program().display()))?;
+        // By its name: clients read it too.
+        let program =
+            Path::new(command.get_program()).file_name().unwrap_or(command.get_program()).display().to_string();
+        let child = child.map_err(|e| format!("{program} cannot be started: {e}"))?;
         Ok(Self { child, asked: None, grace: launch.grace })
     }
 
@@ -110,6 +114,13 @@ impl Process {
         // An error means that the group has ended already.
         let _ = group.map(|group| kill_process_group(group, signal));
     }
+}
+
+/// Opens a log without waiting for the reader of a pipe, and refuses everything but a regular file.
+fn open_log(path: &Path) -> io::Result<File> {
+    let flags = (OFlags::NONBLOCK | OFlags::NOFOLLOW).bits().cast_signed();
+    let log = OpenOptions::new().append(true).create(true).custom_flags(flags).open(path)?;
+    if log.metadata()?.is_file() { Ok(log) } else { Err(io::Error::other("it is no regular file")) }
 }
 
 impl Drop for Process {

@@ -13,9 +13,9 @@ const FULL_BELOW_BYTES: u64 = 1 << 20;
 /// Reason of a failed job: exit code or signal, last line of the log, and a hint if the disk is full.
 pub(crate) fn reason(status: ExitStatus, last_log_line: Option<&str>, folder: &Path) -> String {
     let mut reason = ending(status, last_log_line);
-    if let Some(hint) = disk_full(last_log_line.unwrap_or_default(), free_bytes(folder), folder) {
+    if let Some(hint) = disk_full(last_log_line.unwrap_or_default(), free_bytes(folder)) {
         reason.push_str("; ");
-        reason.push_str(&hint);
+        reason.push_str(hint);
     }
     reason
 }
@@ -65,11 +65,10 @@ fn signal_of(status: ExitStatus) -> Option<i32> {
     std::os::unix::process::ExitStatusExt::signal(&status)
 }
 
-fn disk_full(last_log_line: &str, free_bytes: Option<u64>, folder: &Path) -> Option<String> {
+fn disk_full(last_log_line: &str, free_bytes: Option<u64>) -> Option<&'static str> {
     let is_logged = last_log_line.contains("No space left on device") || last_log_line.contains("Disk quota exceeded");
     let is_measured = free_bytes.is_some_and(|free| free < FULL_BELOW_BYTES);
-    (is_logged || is_measured)
-        .then(|| format!("the disk is full: make room at {}, then resume the job", folder.display()))
+    (is_logged || is_measured).then_some("the disk is full: make room at the data folder, then resume the job")
 }
 
 fn free_bytes(folder: &Path) -> Option<u64> {
@@ -105,10 +104,9 @@ mod tests {
 
     #[test]
     fn a_full_disk_is_recognised_by_its_error_or_by_its_free_space() {
-        let folder = Path::new("/data");
-        let hint = "the disk is full: make room at /data, then resume the job";
-        assert_eq!(disk_full("write: No space left on device (os error 28)", None, folder).as_deref(), Some(hint));
-        assert_eq!(disk_full("", Some(4096), folder).as_deref(), Some(hint));
-        assert_eq!(disk_full("no such file", Some(1 << 30), folder), None);
+        let hint = "the disk is full: make room at the data folder, then resume the job";
+        assert_eq!(disk_full("write: No space left on device (os error 28)", None), Some(hint));
+        assert_eq!(disk_full("", Some(4096)), Some(hint));
+        assert_eq!(disk_full("no such file", Some(1 << 30)), None);
     }
 }

@@ -8,10 +8,14 @@ use plica_protocol::jobs::JobState;
 use plica_training::Writer;
 
 use crate::folder::{JobFolder, StoredStatus};
+use crate::keep::REMOVING;
 use crate::store::{Entry, Found, Store};
 
 /// Folder of an incomplete submission; one that a daemon finds at its start was never acknowledged.
 pub(crate) const SUBMITTING: &str = ".submitting";
+
+/// Numbers of jobs stay below.
+const MAX_NUMBER: u32 = 1 << 30;
 
 /// Reads all jobs. Jobs that were queued, running or paused are queued again, however the last daemon ended.
 pub(crate) fn recover(jobs: &Path) -> std::io::Result<Store> {
@@ -21,7 +25,13 @@ pub(crate) fn recover(jobs: &Path) -> std::io::Result<Store> {
     let mut found = BTreeMap::new();
     let mut last_number = 0;
     for entry in fs::read_dir(jobs)?.flatten() {
-        let Some(number) = entry.file_name().to_str().and_then(|name| name.parse().ok()) else { continue };
+        let name = entry.file_name();
+        if name.to_str().is_some_and(|name| name.starts_with(REMOVING)) {
+            fs::remove_dir_all(entry.path())?;
+        }
+        let Some(number) = name.to_str().and_then(|name| name.parse().ok()).filter(|n| *n < MAX_NUMBER) else {
+            continue;
+        };
         last_number = last_number.max(number);
         match read(&entry.path()) {
             Ok(job) => drop(found.insert(number, job)),

@@ -2,7 +2,7 @@
 //!
 //! Queries lock memory only, so that a disk that hangs blocks no status. Writers take the disk's lock first.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -12,6 +12,7 @@ use plica_training::{TrainingJob, TrainingProgress};
 
 use crate::error::JobError;
 use crate::folder::{JobFolder, StoredStatus};
+use crate::keep::Keep;
 use crate::view;
 
 /// One job.
@@ -40,6 +41,12 @@ struct Row {
     version: u64,
     /// Version in `state.json`.
     saved: u64,
+    /// Bytes of its folder when they were counted last.
+    bytes: u64,
+    /// Whether they were counted since the job is over.
+    measured: bool,
+    /// Whether its process has not ended.
+    has_process: bool,
 }
 
 #[derive(Debug, Default)]
@@ -47,6 +54,22 @@ struct Table {
     rows: BTreeMap<u32, Row>,
     version: u64,
     last_number: u32,
+    /// Jobs that were removed since the start.
+    removed: u32,
+    /// Job whose examples enrich the skin.
+    in_use: Option<u32>,
+    /// Job whose examples are being read.
+    being_read: Option<u32>,
+}
+
+impl Row {
+    fn new(entry: Entry, version: u64, saved: u64, bytes: u64) -> Self {
+        Self { entry, version, saved, bytes, measured: false, has_process: false }
+    }
+
+    fn is_over(&self) -> bool {
+        self.entry.status.state.is_over()
+    }
 }
 
 /// All jobs.
@@ -60,8 +83,9 @@ pub(crate) struct Store {
 impl Store {
     /// Store of the jobs found. `last_number`: largest number of any folder, whether it is a job or not.
     pub(crate) fn new(jobs: PathBuf, found: BTreeMap<u32, Found>, last_number: u32) -> Self {
-        let row = |(number, Found { entry, changed })| (number, Row { entry, version: 1, saved: (!changed).into() });
-        let table = Table { rows: found.into_iter().map(row).collect(), version: 1, last_number };
+        let row = |(number, Found { entry, changed })| (number, Row::new(entry, 1, (!changed).into(), 0));
+        let rows = found.into_iter().map(row).collect();
+        let table = Table { rows, version: 1, last_number, ..Table::default() };
         Self { jobs, table: Mutex::new(table), disk: Mutex::new(()) }
     }
 
@@ -77,11 +101,11 @@ impl Store {
         table.last_number
     }
 
-    /// Adds a job whose folder is complete.
-    pub(crate) fn insert(&self, number: u32, entry: Entry) -> Job {
+    /// Adds a job whose folder is complete and has `bytes`.
+    pub(crate) fn insert(&self, number: u32, entry: Entry, bytes: u64) -> Job {
         let mut table = self.lock();
         table.version += 1;
-        let row = Row { entry, version: table.version, saved: table.version };
+        let row = Row::new(entry, table.version, table.version, bytes);
         let view = row.entry.view();
         table.rows.insert(number, row);
         view
@@ -90,7 +114,77 @@ impl Store {
     /// Number of the job with an id.
     pub(crate) fn find(&self, id: &str) -> Result<u32, JobError> {
         let number = id.parse().ok().filter(|n| self.lock().rows.get(n).is_some_and(|row| row.entry.job.id == id));
-        number.ok_or_else(|| JobError::Unknown(id.chars().take(64).collect()))
+        number.ok_or_else(|| self.unknown(id))
+    }
+
+    fn unknown(&self, id: &str) -> JobError {
+        let shown: String = id.chars().take(64).collect();
+        let table = self.lock();
+        let was_given = id.parse().is_ok_and(|n: u32| n > 0 && n <= table.last_number);
+        if was_given && table.removed > 0 { JobError::Removed(shown) } else { JobError::Unknown(shown) }
+    }
+
+    /// Bytes of the jobs that are not over.
+    pub(crate) fn unfinished_bytes(&self) -> u64 {
+        self.lock().rows.values().filter(|row| !row.is_over()).map(|row| row.bytes).sum()
+    }
+
+    /// Counts the bytes of jobs that are over since.
+    pub(crate) fn measure(&self) {
+        let is_new =
+            |(number, row): (&u32, &Row)| (row.is_over() && !row.measured).then(|| (*number, row.entry.folder.clone()));
+        let new: Vec<_> = self.lock().rows.iter().filter_map(is_new).collect();
+        for (number, folder) in new {
+            let bytes = folder.bytes();
+            if let Some(row) = self.lock().rows.get_mut(&number).filter(|row| row.is_over()) {
+                (row.bytes, row.measured) = (bytes, true);
+            }
+        }
+    }
+
+    /// The next finished job beyond the bounds, none of `staying`.
+    pub(crate) fn excess(&self, keep: Keep, staying: &BTreeSet<u32>) -> Option<(u32, JobFolder)> {
+        let table = self.lock();
+        let over = || table.rows.iter().filter(|(_, row)| row.is_over());
+        if over().count() <= keep.jobs && over().map(|(_, row)| row.bytes).sum::<u64>() <= keep.bytes {
+            return None;
+        }
+        let removable = over().filter(|(number, _)| table.is_removable(**number) && !staying.contains(number));
+        let (number, row) =
+            removable.min_by_key(|(number, row)| (row.entry.status.state == JobState::Done, **number))?;
+        Some((*number, row.entry.folder.clone()))
+    }
+
+    /// Takes a finished job out of the table; false if it must stay.
+    pub(crate) fn forget(&self, number: u32) -> bool {
+        let mut table = self.lock();
+        let removable = table.is_removable(number);
+        if removable {
+            table.rows.remove(&number);
+            table.removed += 1;
+        }
+        removable
+    }
+
+    /// Notes whether the process of a job has not ended.
+    pub(crate) fn set_process(&self, number: u32, has_process: bool) {
+        if let Some(row) = self.lock().rows.get_mut(&number) {
+            row.has_process = has_process;
+        }
+    }
+
+    /// Keeps a job while its examples are read.
+    pub(crate) fn begin_use(&self, number: u32) {
+        self.lock().being_read = Some(number);
+    }
+
+    /// Ends the reading of examples: those of a job, or of a file, enrich the skin now, or nothing has changed.
+    pub(crate) fn end_use(&self, enriches: bool) {
+        let mut table = self.lock();
+        let read = table.being_read.take();
+        if enriches {
+            table.in_use = read;
+        }
     }
 
     /// Job with a client id.
@@ -131,7 +225,8 @@ impl Store {
     pub(crate) fn list(&self) -> JobListReply {
         let jobs = self.newest(MAX_LISTED);
         let older = self.lock().rows.len().saturating_sub(jobs.len()) as u32;
-        JobListReply { jobs, older }
+        let removed = self.lock().removed;
+        JobListReply { jobs, older, removed }
     }
 
     /// Present version, and the jobs changed since `version`.
@@ -150,6 +245,7 @@ impl Store {
         let answer = change(&mut row.entry.status);
         if row.entry.status != before {
             row.version = version;
+            row.measured = false;
             table.version = version;
         }
         Some(answer)
@@ -193,6 +289,14 @@ impl Store {
 
     fn lock(&self) -> MutexGuard<'_, Table> {
         self.table.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Table {
+    fn is_removable(&self, number: u32) -> bool {
+        let is_newest = self.rows.last_key_value().is_some_and(|(newest, _)| *newest == number);
+        let is_used = [self.in_use, self.being_read].contains(&Some(number));
+        self.rows.get(&number).is_some_and(|row| row.is_over() && !row.has_process) && !is_used && !is_newest
     }
 }
 

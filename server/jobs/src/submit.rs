@@ -4,11 +4,12 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-use plica_protocol::jobs::{JobSubmitReply, JobSubmitRequest};
-use plica_training::{TrainingJob, default_threads, now_unix_s, sync_folder};
+use plica_protocol::jobs::{JobSubmitReply, JobSubmitRequest, MAX_REQUEST_BYTES};
+use plica_training::{RegularFile, TrainingJob, default_threads, now_unix_s, sync_folder};
 
 use crate::error::JobError;
 use crate::folder::{JobFolder, StoredStatus};
+use crate::keep::Keep;
 use crate::recover::SUBMITTING;
 use crate::scene::{JobScene, ServedScene};
 use crate::store::{Entry, Store};
@@ -22,6 +23,7 @@ pub(crate) fn submit(
     store: &Store,
     request: &JobSubmitRequest,
     served: &ServedScene,
+    keep: Keep,
 ) -> Result<JobSubmitReply, JobError> {
     if let Some(entry) = store.find_client_id(&request.client_id) {
         check_same(&entry, request)?;
@@ -35,16 +37,17 @@ pub(crate) fn submit(
     let job = training_job(request, &scene, format!("{number:04}"));
     let folder = JobFolder::new(store.jobs().join(&job.id));
     let status = StoredStatus::queued();
-    make(store.jobs(), &folder, &scene, &job, &status)
-        .map_err(|e| JobError::Disk(format!("{}: {e}", folder.path().display())))?;
+    let room = Room { unfinished_bytes: store.unfinished_bytes(), most_bytes: keep.bytes };
+    let bytes = make(store.jobs(), &folder, &scene, &job, &status, room)?;
     let entry = Entry { folder, job, status, progress: None };
-    Ok(JobSubmitReply { created: true, job: store.insert(number, entry) })
+    Ok(JobSubmitReply { created: true, job: store.insert(number, entry, bytes) })
 }
 
 /// Refuses a request that differs from the job with its client id. Keys that the request leaves out are not compared.
 fn check_same(entry: &Entry, request: &JobSubmitRequest) -> Result<(), JobError> {
     let job = &entry.job;
-    let scene = request.scene.as_ref().map(|text| fs::read(entry.folder.scene()).is_ok_and(|t| t == text.as_bytes()));
+    let stored = || RegularFile::open_unlinked(&entry.folder.scene(), MAX_REQUEST_BYTES as u64)?.read();
+    let scene = request.scene.as_ref().map(|text| stored().is_ok_and(|stored| stored == text.as_bytes()));
     let differs = [
         ("kind", job.kind != view::training_kind(request.kind)),
         ("examples", job.examples != request.examples),
@@ -58,7 +61,7 @@ fn check_same(entry: &Entry, request: &JobSubmitRequest) -> Result<(), JobError>
     }
 }
 
-fn training_job(request: &JobSubmitRequest, scene: &JobScene, id: String) -> TrainingJob {
+fn training_job(request: &JobSubmitRequest, scene: &JobScene<'_>, id: String) -> TrainingJob {
     TrainingJob {
         id,
         client_id: request.client_id.clone(),
@@ -71,23 +74,52 @@ fn training_job(request: &JobSubmitRequest, scene: &JobScene, id: String) -> Tra
     }
 }
 
-/// Fills the folder under another name and renames it, so that it is complete or absent.
-fn make(jobs: &Path, folder: &JobFolder, scene: &JobScene, job: &TrainingJob, status: &StoredStatus) -> io::Result<()> {
-    let path = jobs.join(SUBMITTING);
-    let made = fill(&JobFolder::new(path.clone()), scene, job, status);
-    let made = made.and_then(|()| fs::rename(&path, folder.path())).and_then(|()| sync_folder(jobs));
-    if made.is_err() {
-        let _ = fs::remove_dir_all(&path);
+/// Room for jobs that have not ended.
+#[derive(Debug, Clone, Copy)]
+struct Room {
+    unfinished_bytes: u64,
+    most_bytes: u64,
+}
+
+impl Room {
+    fn check(self, new_bytes: u64) -> Result<(), JobError> {
+        let bytes = self.unfinished_bytes.saturating_add(new_bytes);
+        if bytes > self.most_bytes { Err(JobError::NoRoom { bytes, most: self.most_bytes }) } else { Ok(()) }
+    }
+}
+
+/// Fills the folder under another name and renames it, so that it is complete or absent. Returns its bytes.
+fn make(
+    jobs: &Path,
+    folder: &JobFolder,
+    scene: &JobScene<'_>,
+    job: &TrainingJob,
+    status: &StoredStatus,
+    room: Room,
+) -> Result<u64, JobError> {
+    let submitting = JobFolder::new(jobs.join(SUBMITTING));
+    let disk = |e: io::Error| JobError::Disk(e.to_string());
+    let made = fill(&submitting, scene, job, status).and_then(|()| {
+        let bytes = submitting.bytes();
+        room.check(bytes)?;
+        fs::rename(submitting.path(), folder.path()).and_then(|()| sync_folder(jobs)).map_err(disk)?;
+        Ok(bytes)
+    });
+    if let Err(error) = &made {
+        if let JobError::Disk(problem) = error {
+            tracing::warn!("{}: a job cannot be stored: {problem}", jobs.display());
+        }
+        let _ = fs::remove_dir_all(submitting.path());
     }
     made
 }
 
-fn fill(folder: &JobFolder, scene: &JobScene, job: &TrainingJob, status: &StoredStatus) -> io::Result<()> {
+fn fill(folder: &JobFolder, scene: &JobScene<'_>, job: &TrainingJob, status: &StoredStatus) -> Result<(), JobError> {
+    let disk = |e: io::Error| JobError::Disk(e.to_string());
     if folder.path().exists() {
-        fs::remove_dir_all(folder.path())?;
+        fs::remove_dir_all(folder.path()).map_err(disk)?;
     }
-    fs::create_dir(folder.path())?;
+    fs::create_dir(folder.path()).map_err(disk)?;
     scene.write(folder.paths())?;
-    folder.write_status(status)?;
-    folder.write_job(job)
+    folder.write_status(status).and_then(|()| folder.write_job(job)).map_err(disk)
 }

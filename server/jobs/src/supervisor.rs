@@ -14,6 +14,7 @@ use plica_protocol::jobs::{JobFile, JobState};
 use plica_training::now_unix_s;
 
 use crate::folder::{JobFolder, StoredStatus};
+use crate::keep::{Keep, prune};
 use crate::process::{Launch, Process};
 use crate::reason::reason;
 use crate::store::Store;
@@ -28,13 +29,14 @@ pub(crate) struct Supervisor {
     store: Arc<Store>,
     launch: Launch,
     stop: Arc<AtomicBool>,
+    keep: Keep,
     /// Number of the running job, and its process.
     running: Option<(u32, Process)>,
 }
 
 impl Supervisor {
-    pub(crate) fn new(store: Arc<Store>, launch: Launch, stop: Arc<AtomicBool>) -> Self {
-        Self { store, launch, stop, running: None }
+    pub(crate) fn new(store: Arc<Store>, launch: Launch, stop: Arc<AtomicBool>, keep: Keep) -> Self {
+        Self { store, launch, stop, keep, running: None }
     }
 
     /// Runs until a stop is requested and no process is left.
@@ -64,10 +66,14 @@ impl Supervisor {
             let next = self.store.queued().into_iter().find(|(_, folder)| !folder.is_busy());
             next.into_iter().for_each(|(number, _)| self.start(number));
         }
+        self.store.measure();
+        prune(&self.store, self.keep);
     }
 
     fn start(&mut self, number: u32) {
         let Some(entry) = self.store.entry(number) else { return };
+        // Before the state, so that a job that is cancelled meanwhile is not removed under its process.
+        self.store.set_process(number, true);
         let started = self.store.change(number, |status| {
             let is_queued = status.state == JobState::Queued;
             if is_queued {
@@ -77,6 +83,7 @@ impl Supervisor {
             is_queued
         });
         if started != Some(true) {
+            self.store.set_process(number, false);
             return;
         }
         match self.launch(number, &entry.folder) {
@@ -84,7 +91,10 @@ impl Supervisor {
                 tracing::info!("job {} runs as process {}", entry.job.id, process.id());
                 self.running = Some((number, process));
             }
-            Err(problem) => self.fail(number, problem),
+            Err(problem) => {
+                self.store.set_process(number, false);
+                self.fail(number, problem);
+            }
         }
     }
 
@@ -114,10 +124,12 @@ impl Supervisor {
             Ok(None) => {}
             Ok(Some(exit)) => {
                 self.running = None;
+                self.store.set_process(number, false);
                 self.finish(number, exit);
             }
             Err(e) => {
                 self.running = None;
+                self.store.set_process(number, false);
                 self.fail(number, format!("its process was lost: {e}"));
             }
         }
@@ -127,6 +139,7 @@ impl Supervisor {
     fn finish(&self, number: u32, exit: ExitStatus) {
         let Some(entry) = self.store.entry(number) else { return };
         let (state, reason) = self.final_state(exit, &entry.folder);
+        let reason = reason.map(|reason| entry.folder.without_place(&reason));
         self.store.change(number, |status| {
             if status.state == JobState::Running {
                 let (reason, finished_unix_s) = (reason.clone(), state.is_over().then(now_unix_s));
@@ -159,6 +172,8 @@ impl Supervisor {
 
     fn fail(&self, number: u32, problem: String) {
         tracing::warn!("job {number:04} has failed: {problem}");
+        let folder = self.store.entry(number).map(|entry| entry.folder);
+        let problem = folder.map_or_else(String::new, |folder| folder.without_place(&problem));
         self.store.change(number, |status| {
             let (state, finished_unix_s) = (JobState::Failed, Some(now_unix_s()));
             *status = StoredStatus { state, reason: Some(problem), finished_unix_s, pid: None, ..status.clone() };

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use plica_daemon::bus::BusOptions;
-use plica_jobs::Priority;
+use plica_jobs::{Keep, Priority};
 use plica_protocol::{DEFAULT_ENDPOINT, DEFAULT_SESSION};
 use plica_trajectory::{OnBadRow, QuaternionOrder, ReadOptions, TimeUnit};
 
@@ -75,6 +75,7 @@ impl BusArgs {
             listen: self.listen.clone(),
             session: self.session.clone(),
             zenoh_config: self.zenoh_config.clone(),
+            databases: None,
         }
     }
 }
@@ -96,9 +97,40 @@ pub struct ServeArgs {
     /// Folder for jobs and their results; one daemon at a time uses it.
     #[arg(long, value_name = "DIR", help = DATA_HELP)]
     pub data: Option<PathBuf>,
+    /// Folder of the databases that clients may activate by name; without it they activate those of jobs only.
+    #[arg(long, value_name = "DIR")]
+    pub databases: Option<PathBuf>,
+    /// Number of finished jobs that are kept; beyond it cancelled and failed ones are removed, then those that are done, oldest first.
+    #[arg(long, value_name = "N", default_value_t = Keep::default().jobs as u32, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub keep_jobs: u32,
+    /// Bytes of finished jobs that are kept, as 500MiB or 8GiB; unfinished jobs have as much room again.
+    #[arg(long, value_name = "SIZE", default_value = "8GiB", value_parser = size)]
+    pub keep_bytes: u64,
     /// Scheduling class of jobs.
     #[arg(long, value_enum, default_value_t, value_name = "CLASS")]
     pub job_priority: JobPriority,
+}
+
+impl ServeArgs {
+    /// Bounds of the jobs that are kept.
+    pub fn keep(&self) -> Keep {
+        Keep { jobs: self.keep_jobs as usize, bytes: self.keep_bytes }
+    }
+}
+
+/// Bytes of a size such as `500MiB`.
+fn size(text: &str) -> Result<u64, String> {
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let unit: u64 = match &text[digits.len()..] {
+        "" | "B" => 1,
+        "KiB" => 1 << 10,
+        "MiB" => 1 << 20,
+        "GiB" => 1 << 30,
+        "TiB" => 1 << 40,
+        other => return Err(format!("`{other}` is no unit; give B, KiB, MiB, GiB or TiB")),
+    };
+    let number: u64 = digits.trim().parse().map_err(|_| format!("`{text}` is no size; give one as 8GiB"))?;
+    number.checked_mul(unit).filter(|bytes| *bytes > 0).ok_or_else(|| format!("`{text}` is out of range"))
 }
 
 /// Scheduling class of jobs.

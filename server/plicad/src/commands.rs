@@ -37,10 +37,10 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
 
 /// The scene of a path; `wedge`, where no such file exists, is the built-in one.
 fn scene(path: &Path) -> Result<Config, ConfigError> {
-    if path == Path::new("wedge") && !path.exists() {
-        return Config::built_in();
-    }
-    Config::from_file(path)
+    let is_built_in = path == Path::new("wedge") && !path.exists();
+    let config = if is_built_in { Config::built_in() } else { Config::from_file(path) }?;
+    config.remarks().iter().for_each(|remark| tracing::warn!("{}: {remark}", config.file().display()));
+    Ok(config)
 }
 
 /// The same, with other examples to start with.

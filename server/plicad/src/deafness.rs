@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use plica_daemon::bus::Peer;
-use plica_training::{now_unix_s, write_json_atomically};
+use plica_training::{MAX_RECORD_BYTES, RegularFile, now_unix_s, write_json_atomically};
 use serde::{Deserialize, Serialize};
 
 /// Exit code of a daemon whose bus is deaf: start it again.
@@ -40,7 +40,8 @@ impl Deafness {
         let Some(file) = data.map(|folder| folder.join(FILE)) else {
             return Self { silent_ms, repeated: Vec::new() };
         };
-        let last = std::fs::read(&file).ok().and_then(|text| serde_json::from_slice::<Record>(&text).ok());
+        let text = RegularFile::open_unlinked(&file, MAX_RECORD_BYTES).and_then(RegularFile::read);
+        let last = text.ok().and_then(|text| serde_json::from_slice::<Record>(&text).ok());
         if let Err(error) = write_json_atomically(&file, &now) {
             tracing::warn!("{}: {error}", file.display());
         }

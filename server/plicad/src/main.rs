@@ -15,7 +15,7 @@ fn main() -> ExitCode {
     match plicad::commands::run(&cli) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            let message = format!("{error:#}");
+            let message = plica_jobs::sentence(&error);
             eprintln!("plicad: {message}");
             if cli.json {
                 print_error(&message);

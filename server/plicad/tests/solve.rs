@@ -264,7 +264,8 @@ fn the_result_is_a_file_for_paraview() {
     for field in ["displacement_m", "cauchy_stress_pa", "von_mises_pa", "jacobian", "region"] {
         assert!(head.contains(&format!("Name=\"{field}\"")), "no {field}");
     }
-    let mesh = plica_geometry::import::read_mesh(Path::new(out), 1.0).unwrap();
+    let mesh =
+        plica_geometry::import::read_mesh(Path::new(out), plica_geometry::import::ReadOptions::unit(1.0)).unwrap();
     assert_eq!((mesh.mesh.n_hexes(), mesh.groups.volume("region=0").unwrap().hexes.len()), (27, 27));
     let refused = plicad(&["solve", file, "--out", "no/such/folder/out.vtu"]);
     assert!(String::from_utf8_lossy(&refused.stderr).contains("there is no folder no/such/folder"));

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -19,10 +20,7 @@ pub struct Document {
 /// One key or array element.
 #[derive(Debug)]
 struct Entry {
-    /// Dotted path; array elements as numbers.
-    path: String,
-    /// Keys and array indices of the path.
-    steps: Vec<String>,
+    place: Arc<Place>,
     /// Bytes of the key's name, or of the element.
     name: Range<usize>,
     /// Bytes of the value.
@@ -31,12 +29,39 @@ struct Entry {
     number: Option<f64>,
 }
 
+/// Key or array index, below its parent. Shared by all below, so that a deep and wide text takes no more memory than a flat
+/// one.
+#[derive(Debug)]
+struct Place {
+    parent: Option<Arc<Place>>,
+    step: String,
+}
+
+impl Place {
+    fn below(parent: Option<&Arc<Self>>, step: &str) -> Arc<Self> {
+        Arc::new(Self { parent: parent.cloned(), step: step.to_owned() })
+    }
+
+    /// Keys and array indices from the top.
+    fn steps(&self) -> Vec<&str> {
+        let chain = std::iter::successors(Some(self), |place| place.parent.as_deref());
+        let mut steps: Vec<&str> = chain.map(|place| place.step.as_str()).collect();
+        steps.reverse();
+        steps
+    }
+
+    /// Dotted path; array elements as numbers.
+    fn path(&self) -> String {
+        self.steps().join(".")
+    }
+}
+
 impl Document {
     /// Parses `text` as TOML. `file` is used in messages and to resolve relative paths.
     pub fn parse(file: &Path, text: &str) -> Result<Self, ConfigError> {
         let table = DeTable::parse(text).map_err(|e| syntax_error(file, text, &e))?;
         let mut entries = Vec::new();
-        list_table(table.get_ref(), &[], &mut entries);
+        list_table(table.get_ref(), None, &mut entries);
         entries.sort_by_key(|entry| entry.value.start);
         Ok(Self { file: file.to_owned(), text: text.to_owned(), entries })
     }
@@ -61,8 +86,8 @@ impl Document {
     }
 
     /// Every number with its path (keys and array indices), in the order of the file.
-    pub(crate) fn numbers(&self) -> impl Iterator<Item = (&[String], f64)> {
-        self.entries.iter().filter_map(|entry| Some((entry.steps.as_slice(), entry.number?)))
+    pub(crate) fn numbers(&self) -> impl Iterator<Item = (Vec<&str>, f64)> {
+        self.entries.iter().filter_map(|entry| Some((entry.place.steps(), entry.number?)))
     }
 
     /// An error about `key` (dotted path; array elements as numbers).
@@ -78,20 +103,24 @@ impl Document {
 
     /// Line of `key`, or of its nearest parent that the file holds.
     fn line_of_key(&self, key: &str) -> Option<usize> {
-        let holds =
-            |e: &&Entry| key.strip_prefix(e.path.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
-        let nearest = self.entries.iter().filter(holds).max_by_key(|e| e.path.len())?;
-        Some(line_of(&self.text, nearest.name.start))
+        let held = |e: &Entry| {
+            let path = e.place.path();
+            let holds = key.strip_prefix(path.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+            holds.then_some((path.len(), e.name.start))
+        };
+        let (_, start) = self.entries.iter().filter_map(held).max_by_key(|(length, _)| *length)?;
+        Some(line_of(&self.text, start))
     }
 
     /// Path of the innermost key whose name or value covers the byte `offset`.
     fn key_at(&self, offset: usize) -> String {
         let covers = |e: &&Entry| e.name.contains(&offset) || e.value.contains(&offset);
-        self.entries.iter().filter(covers).max_by_key(|e| e.path.len()).map(|e| e.path.clone()).unwrap_or_default()
+        let paths = self.entries.iter().filter(covers).map(|e| e.place.path());
+        paths.max_by_key(String::len).unwrap_or_default()
     }
 }
 
-fn list_table(table: &DeTable<'_>, parent: &[String], entries: &mut Vec<Entry>) {
+fn list_table(table: &DeTable<'_>, parent: Option<&Arc<Place>>, entries: &mut Vec<Entry>) {
     for (key, value) in table {
         list_value(key.get_ref(), key.span(), value, parent, entries);
     }
@@ -101,20 +130,20 @@ fn list_value(
     key: &str,
     name: Range<usize>,
     value: &Spanned<DeValue<'_>>,
-    parent: &[String],
+    parent: Option<&Arc<Place>>,
     entries: &mut Vec<Entry>,
 ) {
-    let steps = [parent, &[key.to_owned()]].concat();
+    let place = Place::below(parent, key);
     match value.get_ref() {
-        DeValue::Table(table) => list_table(table, &steps, entries),
+        DeValue::Table(table) => list_table(table, Some(&place), entries),
         DeValue::Array(items) => {
             for (i, item) in items.iter().enumerate() {
-                list_value(&i.to_string(), item.span(), item, &steps, entries);
+                list_value(&i.to_string(), item.span(), item, Some(&place), entries);
             }
         }
         _ => {}
     }
-    entries.push(Entry { path: steps.join("."), steps, name, value: value.span(), number: number(value.get_ref()) });
+    entries.push(Entry { place, name, value: value.span(), number: number(value.get_ref()) });
 }
 
 fn number(value: &DeValue<'_>) -> Option<f64> {

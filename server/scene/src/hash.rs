@@ -10,22 +10,22 @@ use std::path::PathBuf;
 
 use plica_geometry::EmbeddingKind;
 use plica_sim::{ElementKind, Material, ToolDescription, ToolShape};
-use plica_training::fingerprint;
+use plica_training::{FileFault, RegularFile, fingerprint};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use crate::scene::{Config, MeshConfig, ObjectConfig, Region};
+use crate::scene::{Config, MAX_FILE_BYTES, MeshConfig, ObjectConfig, Region};
 
 /// Version of the hash, raised when its meaning changes.
 const HASH_VERSION: u32 = 1;
 
 /// A file that belongs to the scene cannot be read.
 #[derive(Debug, thiserror::Error)]
-#[error("{key}: {path} cannot be read: {source}", path = path.display())]
+#[error("{key}: {path} {source}", path = path.display())]
 pub struct HashError {
     key: String,
     path: PathBuf,
-    source: std::io::Error,
+    source: FileFault,
 }
 
 /// Scene hash, 64 hexadecimal digits.
@@ -114,7 +114,8 @@ fn tool(config: &Config, tool: &ToolDescription) -> Result<Value, HashError> {
 fn mesh_file(config: &Config, tool: &str) -> Result<Value, HashError> {
     let key = format!("tools.{tool}.shape.mesh.file");
     let Some(file) = config.files().iter().find(|f| f.key == key) else { return Ok(Value::Null) };
-    let bytes = std::fs::read(&file.path).map_err(|source| HashError { key, path: file.path.clone(), source })?;
+    let bytes = RegularFile::open(&file.path, MAX_FILE_BYTES).and_then(RegularFile::read);
+    let bytes = bytes.map_err(|source| HashError { key, path: file.path.clone(), source })?;
     let digits = plica_training::hexadecimal(&Sha256::digest(bytes));
     Ok(json!({ "mesh_sha256": digits, "metres_per_unit": file.metres_per_unit }))
 }

@@ -12,6 +12,7 @@ mod ranges;
 mod timed_pose;
 
 pub mod case;
+pub mod extents;
 pub mod hash;
 pub mod model;
 pub mod motion;

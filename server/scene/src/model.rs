@@ -14,14 +14,14 @@ const ON_FACE: f64 = 1e-6;
 #[derive(Debug, thiserror::Error)]
 pub enum SceneModelError {
     /// The skin cannot be interpolated from the mesh.
-    #[error("{file}: objects.{object}.skin: {source}; choose more divisions, or embedding = \"trilinear\"")]
+    #[error("{file}: objects.{object}.skin: {cause}; choose more divisions, or embedding = \"trilinear\"")]
     Embedding {
         /// The scene.
         file: String,
         /// The object.
         object: String,
         /// Why.
-        source: EmbeddingError,
+        cause: EmbeddingError,
     },
     /// A support holds no node.
     #[error(
@@ -38,19 +38,19 @@ pub enum SceneModelError {
         extents: [f64; 3],
     },
     /// The model cannot be built.
-    #[error("{file}: {source}")]
+    #[error("{file}: {cause}")]
     Model {
         /// The scene.
         file: String,
         /// Why.
-        source: ModelError,
+        cause: ModelError,
     },
 }
 
 /// Real-time model of a scene.
 pub fn build(config: &Config) -> Result<Model, SceneModelError> {
     let file = config.file().display().to_string();
-    Model::new(describe(config)?).map_err(|source| SceneModelError::Model { file, source })
+    Model::new(describe(config)?).map_err(|cause| SceneModelError::Model { file, cause })
 }
 
 /// Description of the real-time model of a scene.
@@ -58,9 +58,9 @@ pub fn describe(config: &Config) -> Result<ModelDescription, SceneModelError> {
     let object = config.object();
     let (mesh, skin) = generate(object);
     let skin = skin.clustered();
-    let embedding = Embedding::new(&mesh, skin.positions(), object.skin().embedding).map_err(|source| {
+    let embedding = Embedding::new(&mesh, skin.positions(), object.skin().embedding).map_err(|cause| {
         let (file, object) = (config.file().display().to_string(), object.name().to_owned());
-        SceneModelError::Embedding { file, object, source }
+        SceneModelError::Embedding { file, object, cause }
     })?;
     Ok(ModelDescription {
         fixed: fixed_nodes(config, &mesh)?,
@@ -78,6 +78,7 @@ pub fn describe(config: &Config) -> Result<ModelDescription, SceneModelError> {
         sleep: *config.sleep(),
         tools: config.tools().to_vec(),
         planes: config.planes().to_vec(),
+        bounds_m: object.bounds_m(),
     })
 }
 

@@ -49,6 +49,34 @@ pub enum MotionError {
     },
 }
 
+impl MotionError {
+    /// The error for people who may not see the file: its name, the line and the kind of problem, without its words.
+    pub fn without_content(&self) -> String {
+        let name = |path: &Path| path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        match self {
+            Self::Trajectory(TrajectoryError::Line { path, line, .. }) => {
+                format!("{}:{line}: this line is no pose of a CSV or TUM file", name(path))
+            }
+            Self::Trajectory(TrajectoryError::Io { path, .. }) => format!("{}: cannot be read", name(path)),
+            Self::Trajectory(TrajectoryError::Empty { path }) => format!("{}: the file has no poses", name(path)),
+            Self::UnknownTool { file, known, .. } => {
+                format!("{}: names a tool that the scene does not have; it has: {known}", name(Path::new(file)))
+            }
+            Self::WhichTool { file, known } => {
+                format!("{}: names no tool, and the scene has {known}", name(Path::new(file)))
+            }
+            Self::Trajectory(TrajectoryError::TimeUnit { path, .. }) => {
+                format!("{}: the unit of its times cannot be told; say it with time_unit", name(path))
+            }
+            Self::WhichQuaternionOrder { file, tool } => format!(
+                "{}: `{tool}` starts upside down, and upright if `w` comes first; say quaternion_order",
+                name(Path::new(file))
+            ),
+            Self::Trajectory(_) => "the recorded motion cannot be used".to_owned(),
+        }
+    }
+}
+
 /// How recorded poses are read.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct MotionOptions<'a> {

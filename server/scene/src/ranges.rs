@@ -27,7 +27,7 @@ impl Range {
 /// Refuses the first number of `document` outside the range that `schema` gives its key.
 pub(crate) fn check(document: &Document, schema: &Value) -> Result<(), ConfigError> {
     for (path, value) in document.numbers() {
-        if let Some(range) = range(schema, path).filter(|range| !range.contains(value)) {
+        if let Some(range) = range(schema, &path).filter(|range| !range.contains(value)) {
             let problem = format!("{value} is outside the allowed range {} to {}", range.least, range.most);
             return Err(document.error(&path.join("."), problem, range.meaning));
         }
@@ -36,15 +36,16 @@ pub(crate) fn check(document: &Document, schema: &Value) -> Result<(), ConfigErr
 }
 
 /// Range of the number at `path` (keys and array indices); `None` where the schema gives none.
-pub(crate) fn range(schema: &Value, path: &[String]) -> Option<Range> {
+pub(crate) fn range(schema: &Value, path: &[impl AsRef<str>]) -> Option<Range> {
     descend(schema, schema, path, "")
 }
 
 /// `meaning` is the documentation of the innermost key above `node`, since elements of arrays have none.
-fn descend(root: &Value, node: &Value, path: &[String], meaning: &str) -> Option<Range> {
+fn descend(root: &Value, node: &Value, path: &[impl AsRef<str>], meaning: &str) -> Option<Range> {
     let meaning = node["description"].as_str().unwrap_or(meaning);
     let here = path.is_empty().then(|| own_range(node, meaning)).flatten();
-    let below = || path.split_first().and_then(|(step, rest)| descend(root, child(node, step)?, rest, meaning));
+    let below =
+        || path.split_first().and_then(|(step, rest)| descend(root, child(node, step.as_ref())?, rest, meaning));
     let target = || descend(root, root.pointer(node["$ref"].as_str()?.strip_prefix('#')?)?, path, meaning);
     let choice = || choices(node).find_map(|choice| descend(root, choice, path, meaning));
     here.or_else(below).or_else(target).or_else(choice)

@@ -20,7 +20,7 @@ use schemars::Schema;
 pub use accurate::AccurateConfig;
 pub use bench::{BenchConfig, Keyframe};
 pub use enrichment::EnrichmentConfig;
-pub use files::{SceneFile, named_files};
+pub use files::{MAX_FILE_BYTES, SceneFile};
 pub use material::Region;
 pub use object::{Face, FixedConfig, MeshConfig, ObjectConfig, PositionFormat, PublishConfig, SkinConfig};
 pub use raw::RawConfig;
@@ -30,6 +30,7 @@ pub use training::{OutsideConfig, RecordedConfig, TrainingConfig};
 use crate::checks::Check;
 use crate::document::Document;
 use crate::error::ConfigError;
+use crate::extents::{self, Size};
 use crate::ranges;
 
 /// Text of the built-in scene, the wedge.
@@ -49,6 +50,7 @@ pub struct Config {
     enrichment: EnrichmentConfig,
     files: Vec<SceneFile>,
     text: String,
+    remarks: Vec<String>,
 }
 
 /// JSON Schema of scene files: every key with its meaning, unit and range.
@@ -75,14 +77,25 @@ impl Config {
         Self::parse(file, &text)
     }
 
-    /// Checks the text of a scene file. `file` names it in messages and resolves relative paths.
+    /// Checks the text of a scene file and reads the meshes that it names. `file` names it in messages and resolves relative
+    /// paths.
     pub fn parse(file: &Path, text: &str) -> Result<Self, ConfigError> {
+        Self::parse_with(file, text, &files::read_parts)
+    }
+
+    /// Checks the text of a scene file, with meshes from `parts`.
+    fn parse_with(file: &Path, text: &str, parts: files::Parts<'_>) -> Result<Self, ConfigError> {
         let document = Document::parse(file, text)?;
         let raw: RawConfig = document.read()?;
         ranges::check(&document, schema().as_value())?;
         let check = Check::new(&document);
         let object = object::check(&check, &raw.objects)?;
-        let tools = tool::check(&check, &raw.tools)?;
+        let mut remarks = Vec::new();
+        let (name, size_m) = (object.name(), object.mesh().extents_m());
+        if let Size::Doubtful(doubt) = extents::judge("the object", &format!("objects.{name}.mesh"), size_m) {
+            remarks.push(doubt);
+        }
+        let tools = tool::check(&check, &raw.tools, parts, &mut remarks)?;
         let bench = raw.bench.as_ref().map(|b| bench::check(&check, b, &tools)).transpose()?;
         let training = check_training(&check, &raw, &tools)?;
         Ok(Self {
@@ -97,7 +110,21 @@ impl Config {
             text: text.to_owned(),
             tools,
             bench,
+            remarks,
         })
+    }
+
+    /// Sentences about the scene that its user should read: tools that are not convex, extents that are hardly meant.
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
+    }
+
+    /// Files that the text of a scene names. All of the text is checked, and no file is opened.
+    ///
+    /// # Errors
+    /// As [`Config::parse`], except for the content of files.
+    pub fn files_of(file: &Path, text: &str) -> Result<Vec<SceneFile>, ConfigError> {
+        Ok(Self::parse_with(file, text, &files::stand_in)?.files)
     }
 
     /// Name of the scene: the file's name without its ending.

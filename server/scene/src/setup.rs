@@ -20,12 +20,12 @@ pub enum SetupError {
     #[error(transparent)]
     Hash(#[from] HashError),
     /// The recorded motion cannot be used.
-    #[error("objects.{object}.training.recorded: {source}")]
+    #[error("objects.{object}.training.recorded: {cause}")]
     Motion {
         /// The object.
         object: String,
         /// Why.
-        source: MotionError,
+        cause: MotionError,
     },
     /// The scene has no tool.
     #[error("{file}: the scene has no tool to train with; add a table [tools.<name>]")]
@@ -90,7 +90,7 @@ fn source(config: &Config, training: &TrainingConfig, tool: usize) -> Result<Sou
     let name = config.tools()[tool].name.clone();
     let options = MotionOptions { tool: Some(&name), fit: recorded.fit, read: recorded.read };
     let poses = motion::read(&path, config, options)
-        .map_err(|source| SetupError::Motion { object: config.object().name().to_owned(), source })?;
+        .map_err(|cause| SetupError::Motion { object: config.object().name().to_owned(), cause })?;
     let pose = |timed: &motion::TimedPose| RecordedPose {
         time_s: timed.time_s,
         tool: timed.tool,

@@ -43,6 +43,7 @@ fn soft_block() -> Result<ModelDescription, Box<dyn std::error::Error>> {
         sleep: SleepOptions::default(),
         tools: vec![ball()],
         planes: vec![],
+        bounds_m: None,
     })
 }
 

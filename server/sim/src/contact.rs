@@ -1,6 +1,6 @@
 //! Frictional contact between the skin and tools or planes, imposed inside the implicit solve.
 //!
-//! [`solid`] knows shapes, [`detect`] finds skin points near them, [`rows`] turns them into constraint rows that keep their
+//! [`solid`] knows shapes ([`support_tree`] those of many faces), [`detect`] finds skin points near them, [`rows`] turns them into constraint rows that keep their
 //! multipliers across ticks, [`law`] is the contact and friction law, [`proxy`] the coupled tools, [`coupling`] the
 //! contact operator of the linear solver, [`point`] the contact point on the reference skin.
 
@@ -11,6 +11,7 @@ mod point;
 mod proxy;
 mod rows;
 mod solid;
+mod support_tree;
 mod surface;
 
 pub(crate) use coupling::ContactCoupling;

@@ -38,6 +38,9 @@ pub struct ModelDescription {
     pub tools: Vec<ToolDescription>,
     /// Immovable half-spaces that the skin rests on.
     pub planes: Vec<Plane>,
+    /// Lower and upper corner of the box that the object may move in \[m\]; `None`: a box around the object at rest, far larger
+    /// where nothing holds it ([`Model::room_m`](crate::Model::room_m)).
+    pub bounds_m: Option<[Point3<f64>; 2]>,
 }
 
 /// Isotropic linear elastic material.

@@ -1,5 +1,6 @@
 //! Constant tables of a scene, built from a [`ModelDescription`].
 
+use nalgebra::{Point3, Vector3};
 use plica_geometry::HexMesh;
 use thiserror::Error;
 
@@ -86,6 +87,11 @@ pub struct Cost {
     pub embedding_bytes: usize,
 }
 
+/// Half diagonals around an object that is held: a displacement beyond them is beyond recovery.
+const HELD_ROOM: f64 = 10.0;
+/// Half diagonals around an object that nothing holds: it falls and slides. Farther out `f32` positions are too coarse for contact.
+const FREE_ROOM: f64 = 100.0;
+
 /// One scene's constant tables.
 #[derive(Debug, Clone)]
 pub struct Model {
@@ -103,8 +109,8 @@ pub struct Model {
     pub(crate) solids: Vec<Solid>,
     /// Mean edge of the coarse mesh \[m\].
     pub(crate) cell_size: f32,
-    /// Half the diagonal of the mesh's bounding box \[m\].
-    pub(crate) size: f32,
+    /// Least and largest displacement of a node that stays in the room, along each axis \[m\].
+    pub(crate) largest_displacements: [[f32; 3]; 2],
     /// Length of a sub-step \[s\].
     pub(crate) dt: f32,
 }
@@ -135,7 +141,7 @@ impl Model {
             surface: SkinSurface::new(&d.skin, inverse_mass, static_stiffness),
             solids: solids(d)?,
             cell_size: mean_edge(&d.mesh) as f32,
-            size: half_diagonal(&d.mesh) as f32,
+            largest_displacements: largest_displacements(d),
             dt: h as f32,
             jacobi,
             tridiagonal,
@@ -149,6 +155,16 @@ impl Model {
     /// Description of the scene.
     pub fn description(&self) -> &ModelDescription {
         &self.description
+    }
+
+    /// Whether no node is held, so that the object may fall, slide and roll away.
+    pub fn is_free(&self) -> bool {
+        !self.description.fixed.contains(&true)
+    }
+
+    /// Lower and upper corner of the box that the object may move in \[m\]; once out, it is put back.
+    pub fn room_m(&self) -> [Point3<f64>; 2] {
+        room(&self.description)
     }
 
     /// Nodes of the coarse mesh.
@@ -313,8 +329,22 @@ fn mean_edge(mesh: &HexMesh) -> f64 {
     (mesh.volume() / mesh.n_hexes() as f64).cbrt()
 }
 
-fn half_diagonal(mesh: &HexMesh) -> f64 {
-    let start = (mesh.nodes()[0], mesh.nodes()[0]);
-    let (low, high) = mesh.nodes().iter().fold(start, |(l, h), p| (l.inf(p), h.sup(p)));
-    (high - low).norm() / 2.0
+/// Lower and upper corner of the object at rest \[m\].
+fn extents(mesh: &HexMesh) -> [Point3<f64>; 2] {
+    let start = [mesh.nodes()[0], mesh.nodes()[0]];
+    mesh.nodes().iter().fold(start, |[low, high], p| [low.inf(p), high.sup(p)])
+}
+
+/// The bounds of the scene, or the object at rest with [`HELD_ROOM`] or [`FREE_ROOM`] half diagonals around it.
+fn room(d: &ModelDescription) -> [Point3<f64>; 2] {
+    let [low, high] = extents(&d.mesh);
+    let share = if d.fixed.contains(&true) { HELD_ROOM } else { FREE_ROOM };
+    let around = Vector3::repeat(share * (high - low).norm() / 2.0);
+    d.bounds_m.unwrap_or([low - around, high + around])
+}
+
+/// Displacements that carry the object's rest box to the walls of its room.
+fn largest_displacements(d: &ModelDescription) -> [[f32; 3]; 2] {
+    let ([low, high], [least, most]) = (extents(&d.mesh), room(d));
+    [(least - low).cast().into(), (most - high).cast().into()]
 }

@@ -31,6 +31,12 @@ const MAX_CORRECTION_CELLS: f32 = 0.1;
 /// Speed limit of nodes \[m/s\]: several times the speeds of a hand or a free ring-down, and a bound on those from a
 /// tool forced through the object.
 const MAX_NODE_SPEED: f32 = 10.0;
+/// Normal rows of a slippery tool are stiffer by this factor. Neighbouring skin points hang on the same nodes, so that load
+/// passes between their rows ten times more slowly than one row takes it up; a tool that sways over the skin is then pushed
+/// on by rows that let go late. Friction takes that energy away, and without friction nothing else does.
+const SLIPPERY_STIFFENING: f32 = 100.0;
+/// Coulomb friction from which on the plain stiffness is quiet.
+const SLIPPERY_FRICTION: f32 = 0.1;
 /// Largest reach of contact detection, in cells.
 const MAX_REACH_CELLS: f32 = 2.0;
 
@@ -197,10 +203,19 @@ fn predict_rows(model: &Model, rows: &mut Rows, motions: &[ProxyMotion]) {
         let row = &rows.rows[index];
         let yields = row.inverse_mass;
         let crowd = rows.crowding(index, model.cell_size);
-        rows.rows[index].stiffness = kappa / (h * h * yields * crowd);
+        let stiffness = kappa / (h * h * yields * crowd);
+        let is_tool = (row.contact.body as usize) < motions.len();
+        let stiffening = if is_tool { slippery_stiffening(row.friction) } else { 1.0 };
+        let row = &mut rows.rows[index];
+        (row.stiffness, row.normal_stiffness) = (stiffness, stiffness * stiffening);
         predict_secant(&mut rows.rows[index]);
     }
     stack_forces(rows);
+}
+
+/// Factor on the normal stiffness of a tool's rows: [`SLIPPERY_STIFFENING`] without friction, 1 from [`SLIPPERY_FRICTION`] on.
+fn slippery_stiffening(friction: f32) -> f32 {
+    1.0 + (SLIPPERY_STIFFENING - 1.0) * (1.0 - friction / SLIPPERY_FRICTION).max(0.0)
 }
 
 /// Solves, adapts the rows, and solves again until every row pushes and every friction state holds.

@@ -13,9 +13,6 @@ use crate::state::State;
 use crate::step::{move_tools_freely, step};
 use crate::workspace::Workspace;
 
-/// Largest recoverable displacement, in half diagonals of the object.
-const MAX_DISPLACEMENT: f32 = 10.0;
-
 /// Takes one time step. Allocates nothing; the result depends on nothing but the arguments.
 pub fn tick(
     model: &Model,
@@ -95,10 +92,11 @@ fn any_tool_is_near(model: &Model, state: &State, workspace: &mut Workspace) -> 
 /// Ticks within which a second roll-back discards the last good state too: the object returns to its rest shape.
 const RELAPSE_TICKS: u64 = 50;
 
-/// Output gate: a state that is not finite, or that has left the scene, is replaced by the last good one, at rest.
+/// Output gate: a state that is not finite, or that has left its room, is replaced by the last good one, at rest. An object that
+/// nothing holds goes back to where it began, as it would leave its room again from where it was.
 fn gate_output(model: &Model, state: &mut State, workspace: &mut Workspace, report: &mut TickReport) {
-    let limit = MAX_DISPLACEMENT * model.size;
-    let is_good = |n: &[f32; 4]| n[0].abs() < limit && n[1].abs() < limit && n[2].abs() < limit;
+    let [low, high] = model.largest_displacements;
+    let is_good = |n: &[f32; 4]| (0..3).all(|k| n[k] > low[k] && n[k] < high[k]);
     let is_finite = |n: &[f32; 4]| (n[0] + n[1] + n[2]).is_finite();
     if state.u.iter().all(is_good) && state.v.iter().all(is_finite) && state.proxies_are_finite() {
         state.good_u.copy_from_slice(&state.u);
@@ -108,7 +106,8 @@ fn gate_output(model: &Model, state: &mut State, workspace: &mut Workspace, repo
     }
     report.rolled_back = true;
     state.rollbacks += 1;
-    if state.ticks_since_rollback < RELAPSE_TICKS {
+    let is_finite = state.u.iter().all(is_finite);
+    if state.ticks_since_rollback < RELAPSE_TICKS || (is_finite && model.is_free()) {
         state.good_u.fill([0.0; 4]);
         state.good_quaternions.fill(IDENTITY);
     }

@@ -192,6 +192,83 @@ fn windows_come_and_go_without_a_jump() {
     assert!(most.0 < 0.1 * largest, "{most:?} of {largest}");
 }
 
+/// Largest change of any confidence from tick to tick, and how often one went from below 0.1 to above 0.9 or back.
+#[derive(Debug, Default)]
+struct Flicker {
+    before: Option<[f32; 3]>,
+    largest: f32,
+    /// Whether each was last above 0.9 rather than below 0.1.
+    is_high: [bool; 3],
+    n_turns: usize,
+}
+
+impl Flicker {
+    fn watch(&mut self, it: &Enriched) {
+        let now = [it.live.confidence(0), it.live.confidence(1), it.live.least_confidence()];
+        for (before, now) in self.before.iter().flatten().zip(now) {
+            self.largest = self.largest.max((now - before).abs());
+        }
+        for (is_high, now) in self.is_high.iter_mut().zip(now) {
+            let turns = if *is_high { now < 0.1 } else { now > 0.9 };
+            self.n_turns += usize::from(turns);
+            *is_high ^= turns;
+        }
+        self.before = Some(now);
+    }
+}
+
+#[test]
+fn confidence_moves_as_steadily_as_detail_does() {
+    let away = Point3::new(0.05, 0.03, 0.3);
+    let still = deep(0.05, 0.03, 0.004);
+    // Presses, slides out of what was taught, and is taken away; then trembles on the skin, jumps elsewhere, and is taken away
+    // while another tool comes, goes, and comes again.
+    let first = |k: i32| match k {
+        0..200 => deep(0.05, 0.03, 0.004 * f64::from(k) / 200.0),
+        200..600 => deep(0.05 + 0.05 * f64::from(k - 200) / 400.0, 0.03, 0.004),
+        1000..1300 => deep(0.05, 0.03, 0.0008 * (f64::from(k) * 0.7).sin()),
+        1300..1400 => still,
+        1400..1500 => deep(0.065, 0.022, 0.003),
+        _ => away,
+    };
+    let second = |k: i32| if (1600..2200).contains(&k) && k % 150 < 75 { deep(0.04, 0.03, 0.003) } else { away };
+    let (mut it, mut flicker) = (Enriched::new(2), Flicker::default());
+    for (phase, ticks) in
+        [("press", 0..200), ("slide", 200..600), ("release", 600..1000), ("tremble", 1000..1300), ("rest", 1300..3500)]
+    {
+        (flicker.largest, flicker.n_turns) = (0.0, 0);
+        for k in ticks {
+            it.tick(&[first(k), second(k)]);
+            flicker.watch(&it);
+        }
+        println!("{phase}: largest change per tick {:.4}, {} turns", flicker.largest, flicker.n_turns);
+        assert!(flicker.largest < 0.0201, "{phase}: {}", flicker.largest);
+        assert!(phase != "tremble" || flicker.n_turns <= 3, "{}", flicker.n_turns);
+    }
+    assert_eq!(it.live.least_confidence(), 0.0, "nothing touches any more");
+}
+
+/// Frames are written more seldom than ticks are taken.
+#[test]
+fn confidence_is_as_steady_when_frames_are_rare() {
+    let (mut it, mut flicker) = (Enriched::new(1), Flicker::default());
+    let mut skin = it.skin.clone();
+    for k in 0..400 {
+        let place = if k < 300 { deep(0.05, 0.03, 0.004) } else { Point3::new(0.05, 0.03, 0.3) };
+        it.run.tick(&[(0, at(place))]);
+        it.live.follow(&it.run.model, &it.run.state);
+        if k % 11 == 0 {
+            it.live.write_skin(&it.run.model, &it.run.state, &mut skin);
+        }
+        let now = it.live.confidence(0);
+        let before = flicker.before.map_or(now, |b| b[0]);
+        flicker.largest = flicker.largest.max((now - before).abs());
+        flicker.before = Some([now; 3]);
+        assert!(k != 150 || now > 0.5, "{now} in a press that is held");
+    }
+    assert!(flicker.largest < 0.0201, "{}", flicker.largest);
+}
+
 #[test]
 fn detail_never_pushes_the_skin_into_the_tool() {
     let mut it = Enriched::new(1);
@@ -258,6 +335,11 @@ fn every_method_serves_what_it_is_measured_by() {
         let mut it = Enriched::with(1, method.options(axes));
         it.glide(deep(0.05, 0.03, 0.0), deep(0.05, 0.03, 0.005), 100, |_| ());
         it.live.forget();
+        it.tick(&[deep(0.05, 0.03, 0.005)]);
+        for _ in 0..60 {
+            it.run.tick(&[(0, at(deep(0.05, 0.03, 0.005)))]);
+            it.live.follow(&it.run.model, &it.run.state);
+        }
         it.tick(&[deep(0.05, 0.03, 0.005)]);
         let mut bench = Bench::new(&TRAINING_SET, method.options(axes));
         let confidence = bench.enrich(&press_of(&it.run), 1.0);

@@ -158,3 +158,58 @@ fn candidates_beyond_the_room_are_reported_as_dropped() {
     let report = run.tick(&[(0, at(Point3::new(0.04, 0.02, 0.04 + radius)))]);
     assert!(report.dropped_contacts > KEPT_CANDIDATES, "{}", report.dropped_contacts);
 }
+
+/// A block of 80 x 40 x 40 mm that nothing holds, in free fall above a plane of this slope along x.
+fn free_block(slope: f64, friction: f64, bounds_m: Option<[Point3<f64>; 2]>) -> Run {
+    let size = [0.08, 0.04, 0.04];
+    let scene = Scene::on(block(size, [4, 2, 2]), block_skin(size, 4e-3), E, 0.45).with(|d| {
+        d.fixed.fill(false);
+        d.gravity_m_per_s2 = Vector3::new(0.0, 0.0, -9.81);
+        d.planes =
+            vec![Plane { point_m: Point3::new(0.0, 0.0, -5e-3), normal: Vector3::new(slope.sin(), 0.0, slope.cos()) }];
+        (d.contact.plane_friction, d.bounds_m) = (friction, bounds_m);
+    });
+    scene.run()
+}
+
+fn centre(run: &Run) -> Vector3<f64> {
+    let u = run.state.node_displacements(&run.model);
+    u.iter().sum::<Vector3<f64>>() / u.len() as f64
+}
+
+#[test]
+fn a_free_block_falls_and_slides_for_many_lengths_without_being_put_back() {
+    const LENGTH_M: f64 = 0.08;
+    let slope = 20.0_f64.to_radians();
+    let (mut run, friction) = (free_block(slope, 0.1, None), 0.1);
+    for _ in 0..1000 {
+        assert!(!run.tick(&[]).rolled_back);
+    }
+    let (slid, speed) = (centre(&run), run.state.node_velocities(&run.model)[0].norm());
+    // Constant acceleration `a` against a drag of 1/s times the speed, for 1 s: `a (t - 1 + exp(-t))`.
+    let acceleration = 9.81 * (slope.sin() - friction * slope.cos());
+    let on_paper = acceleration * (-1.0_f64).exp();
+    println!("slid {:.2} m in 1 s ({on_paper:.2} m on paper), {speed:.2} m/s", slid.norm());
+    assert!(slid.norm() > 10.0 * LENGTH_M && (slid.norm() / on_paper - 1.0).abs() < 0.1, "{slid:?}");
+    // Along the plane, neither through it nor off it.
+    assert!((slid.x * slope.sin() + slid.z * slope.cos()).abs() < 0.02, "{slid:?}");
+    assert_eq!(run.state.rollbacks(), 0);
+}
+
+#[test]
+fn a_block_that_leaves_its_bounds_is_put_back_where_it_began_and_counted() {
+    let bounds = [Point3::new(-0.1, -0.1, -0.3), Point3::new(0.3, 0.2, 0.2)];
+    let mut run = free_block(20.0_f64.to_radians(), 0.0, Some(bounds));
+    assert_eq!(run.model.room_m(), bounds);
+    let mut farthest: f64 = 0.0;
+    for round in 1..=3 {
+        let ticks = (1..3000).find(|_| {
+            farthest = farthest.max(centre(&run).x);
+            run.tick(&[]).rolled_back
+        });
+        println!("round {round}: put back after {ticks:?} ticks");
+        assert!(ticks.is_some() && run.state.rollbacks() == round);
+        assert!(centre(&run).norm() == 0.0 && run.state.node_velocities(&run.model).iter().all(|v| v.norm() == 0.0));
+    }
+    assert!(farthest > 0.15 && farthest < 0.3, "{farthest}");
+}

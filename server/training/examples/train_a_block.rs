@@ -92,6 +92,7 @@ fn coarse() -> Result<ModelDescription, Box<dyn Error>> {
         sleep: SleepOptions::default(),
         tools: vec![ball()],
         planes: Vec::new(),
+        bounds_m: None,
     })
 }
 

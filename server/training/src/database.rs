@@ -1,5 +1,6 @@
 //! The example database: one safetensors file (`server/training/FORMAT.md`).
 
+mod plausible;
 mod read;
 mod tensors;
 mod write;
@@ -11,6 +12,7 @@ use plica_accurate::TIE_VERSION;
 use serde::{Deserialize, Serialize};
 
 use crate::example::{Example, Record, Rejection};
+use crate::regular_file::FileFault;
 use plica_sim::enrichment::Examples;
 
 /// What the metadata calls the format.
@@ -26,6 +28,11 @@ pub const SOLVER_VERSION: u32 = 1;
 /// What `contact_point` means.
 pub const CONTACT_POINT: &str = "tool axis (z) on the deformed coarse skin, pulled back to the reference skin; for a ball, \
                                  or where the axis misses, the centroid of weights 1 at gap <= 0 falling smoothly to 0 at 1 mm";
+
+/// Largest database that is read.
+pub const MAX_DATABASE_BYTES: u64 = 1 << 30;
+
+pub use plausible::SceneLimits;
 
 /// Examples of one scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,7 +119,15 @@ pub fn versions() -> BTreeMap<String, u32> {
 /// Why a file is no database that can be used.
 #[derive(Debug, thiserror::Error)]
 pub enum DatabaseError {
-    /// It cannot be read.
+    /// It is no regular file, cannot be read, or is too large.
+    #[error("{path}: {fault}", path = path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        fault: FileFault,
+    },
+    /// It cannot be written.
     #[error("{path}: {error}", path = path.display())]
     Io {
         /// The file.

@@ -7,6 +7,8 @@ use plica_accurate::{SolidError, SolveError};
 use plica_geometry::{EmbeddingError, HullError};
 use plica_sim::ModelError;
 
+use crate::database::DatabaseError;
+
 /// Why there are no interactions.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
@@ -38,7 +40,7 @@ pub enum PlanError {
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
     /// The coarse model.
-    #[error("coarse model: {0}")]
+    #[error("coarse model")]
     Coarse(#[from] ModelError),
     /// The accurate model.
     #[error("accurate model")]
@@ -90,6 +92,9 @@ pub enum TrainingError {
         /// Problem and advice.
         problem: String,
     },
+    /// An example of the job cannot be used or stored.
+    #[error(transparent)]
+    Database(#[from] DatabaseError),
     /// Ended by the observer. Finished examples are kept.
     #[error("interrupted; finished examples are kept, the same command continues from there")]
     Interrupted,

@@ -11,7 +11,8 @@ use crate::atomic_file::write_json_atomically;
 use crate::database::{About, Database, DatabaseError, DatabaseKind};
 use crate::error::TrainingError;
 use crate::example::{Example, Outcome, Rejection};
-use crate::job_folder::{JobPaths, Writer};
+use crate::job_folder::{JobPaths, MAX_RECORD_BYTES, Writer};
+use crate::regular_file::{FileFault, RegularFile};
 
 /// What a job was asked for, `job.json`. What is left out is the scene's to say.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -160,7 +161,7 @@ impl TrainingFolder {
             Outcome::Accepted(example) => {
                 let path = self.paths.example(example.record.index);
                 let one = Database { about: about.clone(), examples: vec![(**example).clone()], rejected: Vec::new() };
-                one.write(&path).map_err(|e| from_database(e, &path))
+                one.write(&path).map_err(from_database)
             }
             Outcome::Rejected(rejection) => {
                 let stored = StoredRejection { about: about.clone(), rejection: rejection.clone() };
@@ -207,7 +208,7 @@ impl TrainingFolder {
         match Database::read(path, None) {
             Ok(mut one) if one.examples.len() == 1 => Ok(Some((one.about, one.examples.remove(0)))),
             Ok(_) | Err(DatabaseError::Malformed { .. } | DatabaseError::Damaged { .. }) => Ok(None),
-            Err(error) => Err(from_database(error, path)),
+            Err(error) => Err(from_database(error)),
         }
     }
 }
@@ -220,10 +221,11 @@ struct StoredRejection {
     rejection: Rejection,
 }
 
-pub(crate) fn from_database(error: DatabaseError, path: &Path) -> TrainingError {
+/// An error of writing keeps the advice for a full disk.
+pub(crate) fn from_database(error: DatabaseError) -> TrainingError {
     match error {
         DatabaseError::Io { path, error } => TrainingError::Io { path, error },
-        other => TrainingError::File { path: path.to_owned(), problem: other.to_string() },
+        other => TrainingError::Database(other),
     }
 }
 
@@ -233,11 +235,14 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<(), TrainingError> 
 
 /// `None` if there is no such file.
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, TrainingError> {
-    let text = match fs::read(path) {
-        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(TrainingError::Io { path: path.to_owned(), error }),
+    let read = RegularFile::open_unlinked(path, MAX_RECORD_BYTES).and_then(RegularFile::read);
+    let file = |problem| TrainingError::File { path: path.to_owned(), problem };
+    let text = match read {
+        Err(FileFault::Io(e)) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(FileFault::Io(error)) => return Err(TrainingError::Io { path: path.to_owned(), error }),
+        Err(fault) => return Err(file(fault.to_string())),
         Ok(text) => text,
     };
     let value = serde_json::from_slice(&text);
-    value.map(Some).map_err(|e| TrainingError::File { path: path.to_owned(), problem: format!("is damaged: {e}") })
+    value.map(Some).map_err(|e| file(format!("is damaged: {e}")))
 }

@@ -60,7 +60,7 @@ pub fn run(
     if database.examples.is_empty() {
         return Err(nothing().into());
     }
-    database.write(&path).map_err(|e| from_database(e, &path))?;
+    database.write(&path).map_err(from_database)?;
     let run = Run {
         threads: n_threads,
         wall_s: begin.elapsed().as_secs_f64(),

@@ -27,6 +27,8 @@ const EXAMPLES: &str = "examples";
 const DATABASE: &str = "database.safetensors";
 const REPORT: &str = "report.json";
 const LOCK: &str = ".lock";
+/// Largest request, status or progress that is read.
+pub const MAX_RECORD_BYTES: u64 = 1 << 20;
 /// Ending of an accepted interaction.
 const EXAMPLE: &str = ".safetensors";
 /// Ending of a rejected interaction.

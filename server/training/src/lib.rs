@@ -23,6 +23,7 @@ mod obstacle;
 mod plan;
 mod random;
 mod recorded;
+mod regular_file;
 mod report;
 mod sensitivity;
 mod setup;
@@ -36,8 +37,8 @@ pub use atomic_file::{sync_folder, write_atomically, write_json_atomically};
 pub use canonical::{fingerprint, hexadecimal, to_text};
 pub use coarse::{Coarse, CoarseResult, Interrupted, Settling, SolveObserver};
 pub use database::{
-    About, CONTACT_POINT, Database, DatabaseError, DatabaseKind, FORMAT, FORMAT_VERSION, METADATA_KEY, SOLVER_VERSION,
-    TANDEM_VERSION, versions,
+    About, CONTACT_POINT, Database, DatabaseError, DatabaseKind, FORMAT, FORMAT_VERSION, MAX_DATABASE_BYTES,
+    METADATA_KEY, SOLVER_VERSION, SceneLimits, TANDEM_VERSION, versions,
 };
 pub use error::{BuildError, INTERRUPTED, PlanError, TrainingError};
 pub use example::{Example, Outcome, Reason, Record, Rejection, SettlingRecord};
@@ -45,9 +46,10 @@ pub use folder::{TrainingFolder, TrainingJob, TrainingProgress, TrainingStage};
 pub use generate::{Observer, run};
 pub use host::{default_threads, now_unix_s};
 pub use interaction::{Action, Interaction};
-pub use job_folder::{JobPaths, Writer};
+pub use job_folder::{JobPaths, MAX_RECORD_BYTES, Writer};
 pub use plan::plan;
 pub use random::GENERATOR;
+pub use regular_file::{FileFault, RegularFile};
 pub use report::{Run, Solves, Spread, Summary, TrainingReport, largest, rms};
 pub use sensitivity::{Difference, Force, Sensitivity, Variations, sensitivity};
 pub use setup::{

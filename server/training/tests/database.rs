@@ -216,3 +216,75 @@ fn another_scene_and_a_missing_file_are_told_apart() {
     let message = Database::read(&folder.path().join("none"), None).unwrap_err().to_string();
     assert!(message.contains("none") && message.contains("No such file"), "{message}");
 }
+
+/// Limits that the examples of this file fit.
+fn limits() -> SceneLimits {
+    SceneLimits { scene_hash: HASH.to_owned(), n_nodes: 5, n_skin: 7, lowest_m: [0.0; 3], highest_m: [3.0, 3.0, 3.0] }
+}
+
+fn read_for(path: &Path, limits: &SceneLimits) -> Result<Database, DatabaseError> {
+    Database::read_for(RegularFile::open(path, MAX_DATABASE_BYTES).unwrap(), path, limits)
+}
+
+#[test]
+fn numbers_that_the_object_cannot_have_are_refused_with_example_and_value() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("database.safetensors");
+    let refused = |change: &dyn Fn(&mut Example)| {
+        let mut database = database(true);
+        change(&mut database.examples[1]);
+        database.write(&path).unwrap();
+        match read_for(&path, &limits()) {
+            Ok(_) => String::new(),
+            Err(error) => error.to_string(),
+        }
+    };
+    assert_eq!(refused(&|_| {}), "");
+    let turned = |angle: f64| [[angle.cos(), angle.sin(), 0.0], [-angle.sin(), angle.cos(), 0.0], [0.0, 0.0, 1.0]];
+    assert_eq!(refused(&|e| e.contact_frame = turned(0.3)), "");
+    assert_eq!(refused(&|e| e.detail[3] = [5.1, 0.0, 0.0]), "", "shorter than the diagonal of 5.196 m");
+    let absurd: [(&str, &dyn Fn(&mut Example)); 11] = [
+        ("d[3] is 5.300e0 m long", &|e| e.detail[3] = [5.3, 0.0, 0.0]),
+        ("d[0] is 1.732e30 m long", &|e| e.detail[0] = [1e30; 3]),
+        ("d[6] is ", &|e| e.detail[6] = [3e38; 3]),
+        ("u[4] is 6.000e0 m long", &|e| e.displacements[4] = [0.0, -6.0, 0.0]),
+        ("d_independent[1] is ", &|e| e.independent_detail.as_mut().unwrap()[1] = [9.0; 3]),
+        ("contact_frame [[0.0, 0.0, 0.0]", &|e| e.contact_frame = [[0.0; 3]; 3]),
+        ("contact_frame [[1e300", &|e| e.contact_frame = [[1e300; 3]; 3]),
+        ("contact_frame", &|e| e.contact_frame[2] = [0.0, 0.0, -1.0]),
+        ("contact_point [4.0, 0.0, 0.0] m lies off the object", &|e| e.contact_point = [4.0, 0.0, 0.0]),
+        ("tool_pose is at [10000000000.0, ", &|e| e.tool_pose[0] = 1e10),
+        ("quaternion of tool_pose has length 2e0", &|e| e.tool_pose[6] = 2.0),
+    ];
+    for (expected, change) in absurd {
+        let message = refused(change);
+        assert!(message.contains("example 2: ") && message.contains(expected), "{expected}: {message}");
+    }
+}
+
+#[test]
+fn sizes_of_another_scene_are_refused_before_the_examples_are_read() {
+    let folder = TempDir::new().unwrap();
+    let (path, bytes) = written(&folder);
+    let other = SceneLimits { n_skin: 8, ..limits() };
+    let message = read_for(&path, &other).unwrap_err().to_string();
+    assert!(message.contains("tensor `d` is [2, 7, 3]") && message.contains("[2, 8, 3]"), "{message}");
+    // The header is wrong in a way that the checksum would tell: sizes come first.
+    let mut damaged = bytes.clone();
+    *damaged.last_mut().unwrap() ^= 1;
+    fs::write(&path, damaged).unwrap();
+    assert!(read_for(&path, &other).unwrap_err().to_string().contains("[2, 8, 3]"));
+    assert!(read_for(&path, &limits()).unwrap_err().to_string().contains("damaged"));
+}
+
+#[test]
+fn a_sparse_file_is_refused_by_its_header_or_its_size() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("database.safetensors");
+    let sparse = |bytes: u64| {
+        fs::File::create(&path).unwrap().set_len(bytes).unwrap();
+        refusal(&path)
+    };
+    assert!(sparse(1 << 30).contains("truncated, or not a safetensors file"));
+    assert!(sparse(4 << 30).contains("has 4294967296 bytes; at most 1073741824 are read"));
+}

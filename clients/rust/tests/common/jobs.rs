@@ -63,7 +63,7 @@ pub(crate) fn answer(method: Method, payload: &[u8]) -> Result<Value, ErrorReply
         Method::JobSubmit => serde_json::to_value(submit(&decode_request(payload)?)?),
         Method::JobList => {
             let jobs = vec![find(DONE)?, find(FAILED)?, find(ENDLESS)?];
-            serde_json::to_value(JobListReply { jobs, older: 2 })
+            serde_json::to_value(JobListReply { jobs, older: 2, removed: 1 })
         }
         Method::JobCancel => find(&id()?).map(|_| serde_json::to_value(job(ENDLESS, JobState::Cancelled)))?,
         Method::JobResume => find(&id()?).map(|_| serde_json::to_value(job(FAILED, JobState::Queued)))?,

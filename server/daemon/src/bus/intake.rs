@@ -1,24 +1,24 @@
 //! The gates of all tools, and the queues behind them.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use plica_protocol::DecodeError;
 use plica_protocol::pose::Pose;
-use plica_protocol::rpc::{ErrorCode, ErrorReply, StepPose};
+use plica_protocol::rpc::{ErrorCode, ErrorReply, StepRequest};
 use plica_protocol::status::{Counters, QUEUE_FULL};
 use plica_sim::{PoseSample, ToolPose};
 
 use super::pose_gate::PoseGate;
 use super::scene_info::SceneInfo;
-use crate::realtime::MAX_STEP_POSES;
+use crate::realtime::Statistics;
 use crate::wire;
 
 /// Gates and queues of poses for the simulation thread.
 pub(super) struct PoseIntake {
     names: Vec<String>,
     tools: Vec<Mutex<Tool>>,
-    started: Instant,
+    /// Holds simulated time, which judges order and takeover: while it stands, no source becomes stale.
+    statistics: Arc<Statistics>,
 }
 
 struct Tool {
@@ -27,12 +27,12 @@ struct Tool {
 }
 
 impl PoseIntake {
-    pub(super) fn new(scene: &SceneInfo, queues: Vec<rtrb::Producer<PoseSample>>) -> Self {
+    pub(super) fn new(scene: &SceneInfo, queues: Vec<rtrb::Producer<PoseSample>>, statistics: Arc<Statistics>) -> Self {
         let tool = |(stale_after_s, queue): (&f64, _)| Mutex::new(Tool { gate: PoseGate::new(*stale_after_s), queue });
         Self {
             names: scene.tools.clone(),
             tools: scene.stale_after_s.iter().zip(queues).map(tool).collect(),
-            started: Instant::now(),
+            statistics,
         }
     }
 
@@ -42,7 +42,7 @@ impl PoseIntake {
 
     /// Handles a message for a tool.
     pub(super) fn arrive(&self, tool: usize, message: Result<Pose, DecodeError>) {
-        let now_s = self.now_s();
+        let now_s = self.statistics.sim_time.get();
         let mut tool = self.lock(tool);
         let Some(pose) = tool.gate.admit(message, now_s) else { return };
         if tool.queue.push(wire::pose_sample(&pose)).is_err() {
@@ -50,13 +50,10 @@ impl PoseIntake {
         }
     }
 
-    /// Accepts the poses of a step request: all of them, or none and the error of the first refused one.
-    pub(super) fn take_for_step(&self, poses: &[StepPose]) -> Result<Vec<ToolPose>, ErrorReply> {
-        if poses.len() > MAX_STEP_POSES {
-            let message = format!("{} poses; at most {MAX_STEP_POSES} fit into one step", poses.len());
-            return Err(ErrorReply::new(ErrorCode::RpcMalformed, message));
-        }
-        let now_s = self.now_s();
+    /// Accepts the poses of a step request at simulated time `now_s`: all of them, or none and the error of the first refused one.
+    /// Poses of a step without ticks wait for the next tick, as those from the stream do.
+    pub(super) fn take_for_step(&self, request: &StepRequest, now_s: f64) -> Result<Vec<ToolPose>, ErrorReply> {
+        let poses = &request.poses;
         let mut tools: Vec<_> = (0..self.tools.len()).map(|i| self.lock(i)).collect();
         let mut gates: Vec<_> = tools.iter().map(|t| t.gate.clone()).collect();
         let mut taken = Vec::with_capacity(poses.len());
@@ -67,10 +64,23 @@ impl PoseIntake {
             gates[tool].try_take(&pose, now_s).map_err(|e| bad(e.kind().to_owned()))?;
             taken.push(ToolPose { tool, sample: wire::pose_sample(&pose) });
         }
+        let waits = request.ticks == 0;
+        let n_for = |tool: usize| taken.iter().filter(|pose: &&ToolPose| pose.tool == tool).count();
+        if let Some((tool, _)) = tools.iter().enumerate().find(|(i, t)| waits && t.queue.slots() < n_for(*i)) {
+            let message = format!("{QUEUE_FULL}: too many poses of `{}` wait for a tick; step first", self.names[tool]);
+            return Err(ErrorReply::new(ErrorCode::BadPose, message));
+        }
         for (tool, gate) in tools.iter_mut().zip(gates) {
             tool.gate = gate;
         }
-        Ok(taken)
+        if !waits {
+            return Ok(taken);
+        }
+        for ToolPose { tool, sample } in taken {
+            // There is room: this is the only thread that holds the queue.
+            let _ = tools[tool].queue.push(sample);
+        }
+        Ok(Vec::new())
     }
 
     /// Forgets the sources that hold tools.
@@ -87,10 +97,6 @@ impl PoseIntake {
     fn unknown_tool(&self, name: &str) -> ErrorReply {
         let message = format!("the scene has no tool `{name}`; it has: {}", self.names.join(", "));
         ErrorReply::new(ErrorCode::UnknownTool, message)
-    }
-
-    fn now_s(&self) -> f64 {
-        self.started.elapsed().as_secs_f64()
     }
 
     fn lock(&self, tool: usize) -> MutexGuard<'_, Tool> {

@@ -1,4 +1,4 @@
-//! Gate of one tool's poses: accepts or refuses them, and counts both. No bus, no clock.
+//! Gate of one tool's poses: accepts or refuses them, and counts both. No bus; the only clock is simulated time.
 
 use plica_protocol::DecodeError;
 use plica_protocol::order::{Refusal, SourceOrder};

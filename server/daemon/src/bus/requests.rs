@@ -1,6 +1,7 @@
 //! Requests passed between the threads of the bus.
 
 use std::sync::mpsc::TrySendError;
+use std::time::Instant;
 
 use plica_protocol::rpc::{ErrorCode, ErrorReply};
 use plica_sim::enrichment::LiveEnrichment;
@@ -9,17 +10,21 @@ use zenoh::query::Query;
 
 /// A request that waits for the simulation.
 pub(super) enum Request {
-    /// A received query.
-    Query(Query),
+    /// A received query, and when it arrived.
+    Query(Query, Instant),
+    /// An interrupt has arrived in a queue of its own.
+    Interrupt,
     /// Prepared examples.
     Activate(Box<Activation>),
 }
 
 impl Request {
-    pub(super) fn into_query(self) -> Query {
+    /// The query to answer.
+    pub(super) fn into_query(self) -> Option<Query> {
         match self {
-            Self::Query(query) => query,
-            Self::Activate(activation) => activation.query,
+            Self::Query(query, _) => Some(query),
+            Self::Activate(activation) => Some(activation.query),
+            Self::Interrupt => None,
         }
     }
 }

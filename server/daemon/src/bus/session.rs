@@ -27,11 +27,13 @@ pub struct BusOptions {
     pub session: String,
     /// Zenoh configuration in place of the built-in one.
     pub zenoh_config: Option<PathBuf>,
+    /// Folder of the databases that clients may activate by name.
+    pub databases: Option<PathBuf>,
 }
 
 impl Default for BusOptions {
     fn default() -> Self {
-        Self { listen: None, session: DEFAULT_SESSION.into(), zenoh_config: None }
+        Self { listen: None, session: DEFAULT_SESSION.into(), zenoh_config: None, databases: None }
     }
 }
 

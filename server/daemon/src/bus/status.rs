@@ -149,7 +149,9 @@ fn object(shared: &Shared, reading: &Reading, published: &Published) -> ObjectSt
 fn tools(shared: &Shared, reading: &Reading) -> BTreeMap<String, ToolStatus> {
     let tool = |(i, (name, reading)): (usize, (&String, _))| {
         let (poses_accepted, poses_rejected) = shared.intake.counts(i);
-        (name.clone(), ToolStatus { poses_accepted, poses_rejected, ..wire::tool_status(reading) })
+        // Rounded to a microsecond: 0.2 s is 200 ms.
+        let stale_after_ms = (1e6 * shared.scene.stale_after_s[i]).round() / 1e3;
+        (name.clone(), ToolStatus { stale_after_ms, poses_accepted, poses_rejected, ..wire::tool_status(reading) })
     };
     shared.scene.tools.iter().zip(&reading.tools).enumerate().map(tool).collect()
 }

@@ -1,5 +1,7 @@
 //! Commands to the simulation thread, and their answers.
 
+use std::time::Instant;
+
 use plica_sim::ToolPose;
 use plica_sim::enrichment::LiveEnrichment;
 
@@ -18,7 +20,11 @@ pub enum Command {
         ticks: u32,
         /// Poses; the vector travels back in the reply, so that it is freed elsewhere.
         poses: Vec<ToolPose>,
+        /// Time at which the step stops early, after the tick that runs.
+        deadline: Instant,
     },
+    /// Ends the step that runs after its present tick; answered after that step.
+    Interrupt,
     /// Stores the present state.
     Snapshot,
     /// Returns to a stored state.
@@ -43,6 +49,26 @@ pub struct Outcome {
     pub snapshot: Option<u64>,
     /// Counts activations of examples; 0 is the plain coarse skin.
     pub database_generation: u32,
+    /// Why a step has stopped before its last tick.
+    pub early: Option<EarlyEnd>,
+}
+
+/// A step that stopped before its last tick.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EarlyEnd {
+    /// Ticks that did not run.
+    pub ticks_left: u32,
+    /// The cause.
+    pub cause: EarlyEndCause,
+}
+
+/// Cause of an [`EarlyEnd`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EarlyEndCause {
+    /// [`Command::Interrupt`].
+    Interrupted,
+    /// The deadline of the step.
+    Deadline,
 }
 
 /// Why a command was refused.

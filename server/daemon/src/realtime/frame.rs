@@ -11,7 +11,7 @@ pub struct Frame {
     pub sim_time_s: f64,
     /// Source time of the newest pose of any tool \[ns\].
     pub newest_pose_source_time_ns: u64,
-    /// Whether a state was rolled back since the frame before.
+    /// Whether a state was rolled back since the frame before, or detail that was not finite was left out.
     pub degraded: bool,
     /// Whether the object is at rest and this is a repeat.
     pub sleeping: bool,
@@ -59,6 +59,8 @@ pub struct Reading {
     pub fallbacks: u64,
     /// Contact rows since reset that were found and left out because a tool or plane had its `max_contacts`.
     pub dropped_contacts: u64,
+    /// Counts activations of examples; 0: none is active.
+    pub database_generation: u32,
     /// Least confidence over the tools in contact; `None` while no examples are active.
     pub confidence: Option<f32>,
     /// All tools, `[n_tools]`.

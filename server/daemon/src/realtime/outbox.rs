@@ -156,6 +156,7 @@ impl Outbox {
         frame.due = self.due;
         frame.answers = questions;
         detail.write_skin(model, state, &mut frame.positions, probe);
+        frame.degraded |= detail.is_left_out();
         frame.confidence = detail.least_confidence().unwrap_or(0.0);
         frame.database_generation = detail.generation();
         self.degraded &= !due;
@@ -175,6 +176,7 @@ impl Outbox {
         reading.max_penetration_m = self.max_penetration_m;
         reading.fallbacks = self.fallbacks;
         reading.dropped_contacts = self.dropped_contacts;
+        reading.database_generation = detail.generation();
         reading.confidence = detail.least_confidence();
         reading.tools.copy_from_slice(state.tools());
         self.readings.publish();

@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64};
+use std::time::Instant;
 
 use plica_sim::enrichment::LiveEnrichment;
 use plica_sim::{Model, PoseSample, State, TickInput, TickReport, ToolPose, Workspace};
 use triple_buffer::triple_buffer;
 
-use super::command::{Command, Outcome, Refusal, Reply, Returned};
+use super::command::{Command, EarlyEnd, EarlyEndCause, Outcome, Refusal, Reply, Returned};
 use super::enrichment::Detail;
 use super::frame::{Frame, Reading};
 use super::outbox::{Cadences, Outbox, Present, ToolOutlet};
@@ -22,7 +23,7 @@ const POSE_QUEUE: usize = 256;
 /// Poses per tool that wait while the simulation stands still by itself: the newest, as many as a tool's history holds.
 const POSES_KEPT_IN_PAUSE: usize = 16;
 /// Most poses of one [`Command::Step`].
-pub const MAX_STEP_POSES: usize = 1024;
+const MAX_STEP_POSES: usize = crate::limits::MAX_STEP_POSES;
 /// Wrenches per tool that may wait for their publisher.
 const WRENCH_QUEUE: usize = 256;
 /// Commands that may wait.
@@ -69,9 +70,29 @@ pub struct Loop {
     statistics: Arc<Statistics>,
     lock_step: bool,
     paused: bool,
-    steps_left: u32,
-    step_poses: Vec<ToolPose>,
+    step: Step,
     report: TickReport,
+}
+
+/// The step that runs.
+#[derive(Debug, Default)]
+struct Step {
+    ticks_left: u32,
+    poses: Vec<ToolPose>,
+    deadline: Option<Instant>,
+    early: Option<EarlyEnd>,
+    /// Interrupts to answer after the step.
+    interrupts: u32,
+}
+
+impl Step {
+    /// Makes the next tick the last one, so that a step that has used its poses has run at least one.
+    fn cut(&mut self, cause: EarlyEndCause) {
+        if self.ticks_left > 1 {
+            self.early = Some(EarlyEnd { ticks_left: self.ticks_left - 1, cause });
+            self.ticks_left = 1;
+        }
+    }
 }
 
 impl Loop {
@@ -108,8 +129,7 @@ impl Loop {
             statistics,
             lock_step: options.lock_step,
             paused: options.lock_step,
-            steps_left: 0,
-            step_poses: Vec::new(),
+            step: Step::default(),
             report: TickReport::default(),
             rest,
             model,
@@ -152,7 +172,14 @@ impl Loop {
 
     /// Whether ticks of a command are left.
     pub fn is_stepping(&self) -> bool {
-        self.steps_left > 0
+        self.step.ticks_left > 0
+    }
+
+    /// Ends a step that is past its deadline after one more tick.
+    pub fn end_late_step(&mut self, now: Instant) {
+        if self.step.deadline.is_some_and(|deadline| now >= deadline) {
+            self.step.cut(EarlyEndCause::Deadline);
+        }
     }
 
     /// Whether ticks run on command only.
@@ -175,7 +202,7 @@ impl Loop {
     }
 
     fn stands_still(&self) -> bool {
-        self.paused && self.steps_left == 0
+        self.paused && !self.is_stepping()
     }
 
     fn stay(&mut self) -> Turn {
@@ -202,13 +229,14 @@ impl Loop {
                 self.poses.push(ToolPose { tool, sample });
             }
         }
-        self.poses.extend(self.step_poses.drain(..).take(MAX_STEP_POSES));
+        self.poses.extend(self.step.poses.drain(..).take(MAX_STEP_POSES));
     }
 
     fn tick(&mut self, probe: &mut impl TurnProbe) {
         let input = TickInput { clock_s: self.state.sim_time_s(), poses: &self.poses };
         self.report = plica_sim::tick(&self.model, input, &mut self.state, &mut self.workspace, probe);
         probe.leave();
+        self.statistics.sim_time.set(self.state.sim_time_s());
         self.detail.follow(&self.model, &self.state, probe);
     }
 
@@ -218,12 +246,13 @@ impl Loop {
     }
 
     fn count_step(&mut self) {
-        if self.steps_left == 1 {
+        if self.step.ticks_left == 1 {
             // Moved, not freed: the vector goes back with the reply.
-            let used = std::mem::take(&mut self.step_poses);
-            self.reply(Ok(None), Returned::Poses(used));
+            let Step { poses, early, interrupts, .. } = std::mem::take(&mut self.step);
+            self.answer(Ok(None), Returned::Poses(poses), early);
+            (0..interrupts).for_each(|_| self.reply(Ok(None), Returned::Nothing));
         }
-        self.steps_left = self.steps_left.saturating_sub(1);
+        self.step.ticks_left = self.step.ticks_left.saturating_sub(1);
     }
 
     fn obey_orders(&mut self) {
@@ -244,14 +273,16 @@ impl Loop {
                 self.reply(Ok(None), Returned::Nothing);
             }
             Command::Step { poses, .. } if !self.paused => self.reply(Err(Refusal::NotPaused), Returned::Poses(poses)),
-            Command::Step { poses, .. } if self.steps_left > 0 => {
-                self.reply(Err(Refusal::Busy), Returned::Poses(poses))
+            Command::Step { poses, .. } if self.is_stepping() => self.reply(Err(Refusal::Busy), Returned::Poses(poses)),
+            Command::Step { ticks: 0, poses, .. } => self.reply(Ok(None), Returned::Poses(poses)),
+            Command::Step { ticks, poses, deadline } => {
+                self.step = Step { ticks_left: ticks, poses, deadline: Some(deadline), ..Step::default() };
             }
-            Command::Step { ticks: 0, poses } => self.reply(Ok(None), Returned::Poses(poses)),
-            Command::Step { ticks, poses } => {
-                self.steps_left = ticks;
-                self.step_poses = poses;
+            Command::Interrupt if self.is_stepping() => {
+                self.step.cut(EarlyEndCause::Interrupted);
+                self.step.interrupts += 1;
             }
+            Command::Interrupt => self.reply(Ok(None), Returned::Nothing),
             Command::Snapshot => {
                 let id = self.snapshots.keep(&self.state);
                 self.reply(Ok(Some(id)), Returned::Nothing);
@@ -284,8 +315,13 @@ impl Loop {
         }
     }
 
-    /// Updates the status before it sends the answer.
     fn reply(&mut self, result: Result<Option<u64>, Refusal>, returned: Returned) {
+        self.answer(result, returned, None);
+    }
+
+    /// Updates the status and the clock before it sends the answer.
+    fn answer(&mut self, result: Result<Option<u64>, Refusal>, returned: Returned, early: Option<EarlyEnd>) {
+        self.statistics.sim_time.set(self.state.sim_time_s());
         let present = Present { model: &self.model, state: &self.state, report: &self.report };
         self.outbox.hand_out_reading(present, &self.detail, self.paused);
         let outcome = result.map(|snapshot| Outcome {
@@ -294,6 +330,7 @@ impl Loop {
             paused: self.paused,
             snapshot,
             database_generation: self.detail.generation(),
+            early,
         });
         // The sender never has more commands under way than there is room for answers.
         let _ = self.replies.push(Reply { outcome, returned });

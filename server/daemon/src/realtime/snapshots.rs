@@ -3,7 +3,7 @@
 use plica_sim::State;
 
 /// Number of stored states; the oldest is overwritten.
-const N_KEPT: u64 = 8;
+const N_KEPT: u64 = crate::limits::MAX_SNAPSHOTS;
 
 pub(super) struct Snapshots {
     states: Vec<State>,

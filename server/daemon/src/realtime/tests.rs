@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
+use std::time::{Duration, Instant};
 
 use nalgebra::Isometry3;
 use plica_scene::Config;
@@ -41,6 +42,10 @@ fn sample(sequence: u64, z: f64) -> PoseSample {
         valid: true,
         pose: Isometry3::translation(0.02, 0.02, z),
     }
+}
+
+fn step(ticks: u32, poses: Vec<ToolPose>) -> Command {
+    Command::Step { ticks, poses, deadline: Instant::now() + Duration::from_secs(3600) }
 }
 
 fn order(core: &mut Loop, ports: &mut Ports, command: Command) -> Result<Outcome, Refusal> {
@@ -148,17 +153,53 @@ fn lock_step_ticks_when_told_to() {
     let (mut core, mut ports) = start(true);
     assert_eq!(core.turn(&mut NoProbe), Turn::Still);
     let poses = vec![ToolPose { tool: 0, sample: sample(3, 0.1) }];
-    let outcome = order(&mut core, &mut ports, Command::Step { ticks: 4, poses }).unwrap();
+    let outcome = order(&mut core, &mut ports, step(4, poses)).unwrap();
     assert_eq!((outcome.tick, outcome.paused), (4, true));
     assert_eq!(core.state().tools()[0].pose_sequence, 3);
     assert_eq!(order(&mut core, &mut ports, Command::Resume), Err(Refusal::LockStep));
-    assert_eq!(order(&mut core, &mut ports, Command::Step { ticks: 0, poses: Vec::new() }).unwrap().tick, 4);
+    assert_eq!(order(&mut core, &mut ports, step(0, Vec::new())).unwrap().tick, 4);
+}
+
+#[test]
+fn an_interrupted_step_has_used_its_poses_and_tells_its_tick() {
+    let (mut core, mut ports) = start(true);
+    let poses = vec![ToolPose { tool: 0, sample: sample(3, 0.1) }];
+    ports.commands.orders.push(step(1000, poses)).unwrap();
+    ports.commands.orders.push(Command::Interrupt).unwrap();
+    core.turn(&mut NoProbe);
+    assert!(!core.is_stepping());
+    let stepped = ports.commands.replies.pop().unwrap().outcome.unwrap();
+    let early = EarlyEnd { ticks_left: 999, cause: EarlyEndCause::Interrupted };
+    assert_eq!((stepped.tick, stepped.early), (1, Some(early)));
+    assert_eq!(core.state().tools()[0].pose_sequence, 3);
+    let interrupted = ports.commands.replies.pop().unwrap().outcome.unwrap();
+    assert_eq!((interrupted.tick, interrupted.early), (1, None));
+    // Nothing to interrupt, and nothing left over for the next step.
+    assert_eq!(order(&mut core, &mut ports, Command::Interrupt).unwrap().tick, 1);
+    let whole = order(&mut core, &mut ports, step(3, Vec::new())).unwrap();
+    assert_eq!((whole.tick, whole.early), (4, None));
+}
+
+#[test]
+fn a_step_past_its_deadline_ends_after_one_more_tick() {
+    let (mut core, mut ports) = start(true);
+    let deadline = Instant::now();
+    ports.commands.orders.push(Command::Step { ticks: 500, poses: Vec::new(), deadline }).unwrap();
+    for _ in 0..5 {
+        core.end_late_step(deadline - Duration::from_nanos(1));
+        core.turn(&mut NoProbe);
+    }
+    core.end_late_step(deadline);
+    core.turn(&mut NoProbe);
+    let stepped = ports.commands.replies.pop().unwrap().outcome.unwrap();
+    let early = EarlyEnd { ticks_left: 494, cause: EarlyEndCause::Deadline };
+    assert_eq!((stepped.tick, stepped.early), (6, Some(early)));
 }
 
 #[test]
 fn steps_need_a_pause_and_resume_goes_on() {
     let (mut core, mut ports) = start(false);
-    let refused = order(&mut core, &mut ports, Command::Step { ticks: 1, poses: Vec::new() });
+    let refused = order(&mut core, &mut ports, step(1, Vec::new()));
     assert_eq!(refused, Err(Refusal::NotPaused));
     assert!(order(&mut core, &mut ports, Command::Pause).unwrap().paused);
     let tick = core.state().tick();
@@ -172,10 +213,10 @@ fn steps_need_a_pause_and_resume_goes_on() {
 fn snapshot_and_restore_repeat_the_same_bytes() {
     let (mut core, mut ports) = start(true);
     let press = |sequence, z| vec![ToolPose { tool: 0, sample: sample(sequence, z) }];
-    order(&mut core, &mut ports, Command::Step { ticks: 20, poses: press(1, 0.024) }).unwrap();
+    order(&mut core, &mut ports, step(20, press(1, 0.024))).unwrap();
     let id = order(&mut core, &mut ports, Command::Snapshot).unwrap().snapshot.unwrap();
     let run = |core: &mut Loop, ports: &mut Ports| {
-        order(core, ports, Command::Step { ticks: 30, poses: press(2, 0.023) }).unwrap();
+        order(core, ports, step(30, press(2, 0.023))).unwrap();
         positions(core, ports)
     };
     let once = run(&mut core, &mut ports);
@@ -200,16 +241,21 @@ fn reset_returns_to_rest_and_forgets_waiting_poses() {
     let (mut core, mut ports) = start(true);
     let rest = positions(&mut core, &mut ports);
     let poses = vec![ToolPose { tool: 0, sample: sample(1, 0.022) }];
-    order(&mut core, &mut ports, Command::Step { ticks: 50, poses }).unwrap();
+    order(&mut core, &mut ports, step(50, poses)).unwrap();
     ports.poses[0].push(sample(9, 0.022)).unwrap();
     assert_eq!(order(&mut core, &mut ports, Command::Reset).unwrap().tick, 0);
     assert_eq!(positions(&mut core, &mut ports), rest);
-    order(&mut core, &mut ports, Command::Step { ticks: 1, poses: Vec::new() }).unwrap();
+    order(&mut core, &mut ports, step(1, Vec::new())).unwrap();
     assert!(!core.state().tools()[0].present);
 }
 
 /// A detail of 1 mm downwards wherever the ball presses the middle.
 fn live(model: &Arc<plica_sim::Model>) -> Box<LiveEnrichment> {
+    live_scaled(model, 0.5)
+}
+
+/// The same with a detail of `scale` times the dent.
+fn live_scaled(model: &Arc<plica_sim::Model>, scale: f32) -> Box<LiveEnrichment> {
     let description = model.description();
     let touch = |depth: f64| Touch {
         contact_point: nalgebra::Point3::new(0.02, 0.02, 0.02),
@@ -221,7 +267,7 @@ fn live(model: &Arc<plica_sim::Model>) -> Box<LiveEnrichment> {
             [0.0, 0.0, -(depth * (-off_squared / 1e-4).exp() * p.z / 0.02) as f32]
         };
         let nodes = description.mesh.nodes().iter().map(dent).collect();
-        let detail = description.skin.positions().iter().map(|p| dent(p).map(|x| 0.5 * x)).collect();
+        let detail = description.skin.positions().iter().map(|p| dent(p).map(|x| scale * x)).collect();
         (nodes, detail)
     };
     let depths = [0.001, 0.002, 0.003];
@@ -235,10 +281,10 @@ fn live(model: &Arc<plica_sim::Model>) -> Box<LiveEnrichment> {
 fn activating_changes_the_skin_and_nothing_else() {
     let (mut core, mut ports) = start(true);
     let press = |sequence, z| vec![ToolPose { tool: 0, sample: sample(sequence, z) }];
-    order(&mut core, &mut ports, Command::Step { ticks: 100, poses: press(1, 0.024) }).unwrap();
+    order(&mut core, &mut ports, step(100, press(1, 0.024))).unwrap();
     let coarse = positions(&mut core, &mut ports);
     assert_eq!(ports.frames.frames.output_buffer().database_generation, 0);
-    let own = order(&mut core, &mut ports, Command::Step { ticks: 0, poses: Vec::new() }).unwrap();
+    let own = order(&mut core, &mut ports, step(0, Vec::new())).unwrap();
     let activated = live(core.model());
     let outcome = order(&mut core, &mut ports, Command::Activate(activated)).unwrap();
     assert_eq!(outcome, Outcome { database_generation: 1, ..own });
@@ -250,9 +296,27 @@ fn activating_changes_the_skin_and_nothing_else() {
     assert!(moved > 1e-5, "detail of {moved} m");
     assert_eq!(core.state().tick(), 100);
     ports.wrenches[0].listening.store(true, Relaxed);
-    order(&mut core, &mut ports, Command::Step { ticks: 2, poses: press(2, 0.024) }).unwrap();
+    order(&mut core, &mut ports, step(2, press(2, 0.024))).unwrap();
     assert!(ports.wrenches[0].wrenches.pop().unwrap().confidence > 0.0);
     assert!(ports.readings.read().confidence.unwrap() > 0.0);
+}
+
+#[test]
+fn detail_that_is_not_finite_is_left_out_of_a_degraded_frame() {
+    let (mut core, mut ports) = start(true);
+    let press = |sequence, z| vec![ToolPose { tool: 0, sample: sample(sequence, z) }];
+    order(&mut core, &mut ports, Command::Step { ticks: 100, poses: press(1, 0.024) }).unwrap();
+    let coarse = positions(&mut core, &mut ports);
+    let own = live_scaled(core.model(), f32::INFINITY);
+    order(&mut core, &mut ports, Command::Activate(own)).unwrap();
+    assert_eq!(positions(&mut core, &mut ports), coarse);
+    let frame = ports.frames.frames.output_buffer();
+    assert!(frame.degraded && frame.confidence == 0.0 && frame.database_generation == 1);
+    // Other examples end it.
+    let other = live(core.model());
+    order(&mut core, &mut ports, Command::Activate(other)).unwrap();
+    assert_ne!(positions(&mut core, &mut ports), coarse);
+    assert!(!ports.frames.frames.output_buffer().degraded);
 }
 
 #[test]
@@ -277,10 +341,10 @@ fn a_restored_state_is_enriched_as_it_was_and_a_reset_one_is_at_rest() {
     let activated = live(core.model());
     order(&mut core, &mut ports, Command::Activate(activated)).unwrap();
     let press = |sequence, z| vec![ToolPose { tool: 0, sample: sample(sequence, z) }];
-    order(&mut core, &mut ports, Command::Step { ticks: 100, poses: press(1, 0.024) }).unwrap();
+    order(&mut core, &mut ports, step(100, press(1, 0.024))).unwrap();
     let id = order(&mut core, &mut ports, Command::Snapshot).unwrap().snapshot.unwrap();
     let kept = positions(&mut core, &mut ports);
-    order(&mut core, &mut ports, Command::Step { ticks: 50, poses: press(2, 0.05) }).unwrap();
+    order(&mut core, &mut ports, step(50, press(2, 0.05))).unwrap();
     assert_ne!(positions(&mut core, &mut ports), kept);
     order(&mut core, &mut ports, Command::Restore { id }).unwrap();
     assert_eq!(positions(&mut core, &mut ports), kept);
@@ -293,7 +357,7 @@ fn a_restored_state_is_enriched_as_it_was_and_a_reset_one_is_at_rest() {
 fn the_thread_runs_and_gives_the_loop_back() {
     let (core, _ports) = start(false);
     let running = spawn(core, ThreadOptions::default()).unwrap();
-    std::thread::sleep(std::time::Duration::from_millis(50));
+    std::thread::sleep(Duration::from_millis(50));
     assert!(running.is_alive());
     let core = running.stop().unwrap();
     assert!(core.state().tick() > 0);

@@ -111,29 +111,23 @@ fn run_in_real_time(core: &mut Loop, fifo: bool, stop: &AtomicBool) {
                 }
                 waited = false;
                 timed_turn(core, &mut timer, &statistics);
-                finish(core, &mut pacer, &statistics, now_ns, &mut timer);
+                if core.is_stepping() {
+                    run_steps(core, &mut timer, &statistics, stop);
+                    pacer.restart(now_ns());
+                }
+                pacer.finish(now_ns());
+                statistics.overruns.store(pacer.overruns(), Relaxed);
+                statistics.skipped.store(pacer.skipped(), Relaxed);
             }
         }
     }
 }
 
-/// Closes a turn's account; ticks that were ordered run on without waiting.
-fn finish(
-    core: &mut Loop,
-    pacer: &mut Pacer,
-    statistics: &Statistics,
-    now_ns: impl Fn() -> u64,
-    timer: &mut StageTimer,
-) {
-    if core.is_stepping() {
-        while core.is_stepping() {
-            timed_turn(core, timer, statistics);
-        }
-        pacer.restart(now_ns());
+/// Ticks of a command run on without waiting.
+fn run_steps(core: &mut Loop, timer: &mut StageTimer, statistics: &Statistics, stop: &AtomicBool) {
+    while core.is_stepping() && !stop.load(Relaxed) {
+        timed_turn(core, timer, statistics);
     }
-    pacer.finish(now_ns());
-    statistics.overruns.store(pacer.overruns(), Relaxed);
-    statistics.skipped.store(pacer.skipped(), Relaxed);
 }
 
 fn run_in_lock_step(core: &mut Loop, stop: &AtomicBool) {
@@ -150,6 +144,7 @@ fn run_in_lock_step(core: &mut Loop, stop: &AtomicBool) {
 fn timed_turn(core: &mut Loop, timer: &mut StageTimer, statistics: &Statistics) {
     statistics.turns.fetch_add(1, Relaxed);
     let begin = Instant::now();
+    core.end_late_step(begin);
     if let Turn::Ticked(_) = core.turn(timer) {
         statistics.tick.record(begin.elapsed().as_nanos() as u64);
         timer.record(statistics);

@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::Point3;
 
-use super::NamedMesh;
 use super::error::{DAMAGED, Fault, Place, fault};
 use super::groups::{Group, Groups};
+use super::named_mesh::NamedMesh;
 use crate::hex_mesh::{HexMesh, MeshError};
 use crate::index::{HexIdx, NodeIdx};
 use crate::isoparametric;
@@ -21,6 +21,8 @@ pub(super) struct Content {
     pub(super) cell_labels: Vec<(String, u8, Vec<usize>)>,
     /// Labels of points.
     pub(super) point_labels: Vec<(String, Vec<usize>)>,
+    /// Where the points of each piece of the file begin; empty for a file of one piece.
+    pub(super) pieces: Vec<usize>,
 }
 
 /// A cell by its corners, which index `points`.
@@ -90,7 +92,7 @@ impl Content {
         let nodes = used.map(|(x, _)| x * metres_per_unit).collect();
         let mesh = HexMesh::new(nodes, hexes).map_err(|error| self.mesh_fault(&error, &numbers))?;
         let groups = self.groups(&places);
-        Ok(NamedMesh { mesh, groups })
+        Ok(NamedMesh { mesh, groups, remarks: Vec::new() })
     }
 
     /// Hexahedra of the mesh, and mesh indices of all points and cells.

@@ -29,11 +29,21 @@ struct MshContent {
     unsupported: Vec<(&'static Element, usize)>,
 }
 
+/// Most bytes before `$MeshFormat`.
+const LONGEST_COMMENT: usize = 1 << 16;
+
 /// Supported version.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Version {
     V2,
     V4,
+}
+
+/// Whether a file is Gmsh's: its first section is `$MeshFormat`, or comments come before.
+pub(super) fn is_msh(bytes: &[u8]) -> bool {
+    const FORMAT: &[u8] = b"$MeshFormat";
+    let begin = &bytes[..bytes.len().min(LONGEST_COMMENT)];
+    bytes.starts_with(b"$") || begin.windows(FORMAT.len()).any(|window| window == FORMAT)
 }
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Content, Fault> {
@@ -61,14 +71,17 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Content, Fault> {
         cells: content.cells,
         cell_labels: content.labels.into_vec(),
         point_labels: Vec::new(),
+        pieces: Vec::new(),
     })
 }
 
 /// `$MeshFormat`: version, ASCII or binary, size of numbers, byte order.
 fn read_format(reader: &mut Reader<'_>) -> Result<Version, Fault> {
-    let first = reader.next_section()?;
-    if first != Some("MeshFormat") {
-        return fault(reader.place(), format!("begins with {first:?} in place of $MeshFormat"), DAMAGED);
+    reader.skip_comments()?;
+    match reader.next_section()? {
+        Some("MeshFormat") => {}
+        Some(first) => return fault(reader.place(), format!("begins with ${first} in place of $MeshFormat"), DAMAGED),
+        None => return fault(reader.place(), "has no $MeshFormat", DAMAGED),
     }
     let line = reader.line()?;
     let words: Vec<&str> = line.split_ascii_whitespace().collect();

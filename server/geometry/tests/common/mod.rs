@@ -1,6 +1,8 @@
 //! Meshes and small tools that several tests share.
 #![allow(dead_code, reason = "every test file uses its own part")]
 
+pub(crate) mod vtu;
+
 use nalgebra::{Point3, Vector3};
 use plica_geometry::shapes::{WEDGE_DIVISIONS, WEDGE_SKIN_SPACING_M, Wedge, block, wedge, wedge_skin};
 use plica_geometry::{HexIdx, HexMesh, NodeIdx, Skin};

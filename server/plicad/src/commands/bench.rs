@@ -21,6 +21,9 @@ use crate::work::{table_bytes, work};
 /// What a tick does after the simulation's own stages: poses in, wrenches and frame out.
 const HAND_OVER: &str = "hand_over";
 
+/// Warm-up of a whole pass of the motion, however long it is.
+pub const WHOLE_MOTION: u64 = u64::MAX;
+
 /// What `bench` prints as JSON. Times in microseconds.
 #[derive(Debug, Serialize)]
 pub struct Report {
@@ -78,7 +81,7 @@ pub fn run(args: &BenchArgs, json: bool) -> anyhow::Result<()> {
             config.file().display()
         )
     })?;
-    let report = bench(&config, motion, args.ticks)?;
+    let report = bench(&config, motion, args.ticks, WHOLE_MOTION)?;
     print_table(&report);
     if json {
         println!("{}", serde_json::to_string(&report)?);
@@ -86,8 +89,9 @@ pub fn run(args: &BenchArgs, json: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Times `n_ticks` ticks of a scene, starting its motion anew each time it is through.
-pub fn bench(config: &Config, motion: &BenchConfig, n_ticks: u64) -> anyhow::Result<Report> {
+/// Times `n_ticks` ticks of a scene, starting its motion anew each time it is through. Before, one pass of at most
+/// `most_warm` ticks is not timed.
+pub fn bench(config: &Config, motion: &BenchConfig, n_ticks: u64, most_warm: u64) -> anyhow::Result<Report> {
     let model = Arc::new(model::build(config)?);
     let enrichment = database_loader::at_start(config, &model)?;
     let scene = Scene { config, model: &model, motion, enrichment: enrichment.as_ref() };
@@ -95,8 +99,8 @@ pub fn bench(config: &Config, motion: &BenchConfig, n_ticks: u64) -> anyhow::Res
     let per_pass = 1 + (motion.duration_s() / model.timestep_s()).round() as u64;
     let mut full_press = None;
     // One pass is not counted: it brings tables and branch predictors up to temperature.
-    let mut warm = Timings::new(per_pass);
-    run_pass(&scene, &mut warm, per_pass, &mut full_press);
+    let n_warm = per_pass.min(most_warm);
+    run_pass(&scene, &mut Timings::new(n_warm), n_warm, &mut full_press);
     while (timings.total_ns.len() as u64) < n_ticks {
         let left = n_ticks - timings.total_ns.len() as u64;
         run_pass(&scene, &mut timings, per_pass.min(left), &mut full_press);

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context;
-use plica_daemon::bus::Deaf;
+use plica_daemon::bus::{BusOptions, Deaf};
 use plica_daemon::server::Server;
 use plica_jobs::{DataFolder, DataFolderError, Jobs, Launch, ServedScene, Supervision, default_path};
 use plica_scene::Config;
@@ -25,7 +25,7 @@ pub fn run(args: &ServeArgs, json: bool) -> anyhow::Result<()> {
     if let Some(file) = &args.database {
         config.set_database(file.clone());
     }
-    let options = args.bus.options();
+    let options = BusOptions { databases: args.databases.clone(), ..args.bus.options() };
     let mut server = Server::start_with_jobs(&config, &options, args.lock_step, || open_jobs(args, &config))?;
     for warning in &server.grants().warnings {
         tracing::warn!("{warning}");
@@ -60,27 +60,29 @@ fn open_jobs(args: &ServeArgs, config: &Config) -> Result<(Jobs, Option<Supervis
     let session = &args.bus.session;
     let path = match data_path(args) {
         Ok(path) => path,
-        Err(problem) => return Ok(without_jobs(problem)),
+        Err(problem) => return Ok(without_jobs(&problem, problem.clone())),
     };
     let folder = match DataFolder::open(&path, session) {
         Ok(folder) => folder,
         Err(error @ DataFolderError::Locked { .. }) => return Err(error),
-        Err(error) => return Ok(without_jobs(error.to_string())),
+        Err(error) => return Ok(without_jobs(&error.to_string(), error.without_place())),
     };
     let scene_folder = args.scene.as_ref().and_then(|file| file.parent()).map(Path::to_owned);
     let served = ServedScene { name: config.name().to_owned(), folder: scene_folder, text: config.text().to_owned() };
     let launch = Launch::own(args.job_priority.into(), config.runtime().cpu());
-    let started = launch.and_then(|launch| Jobs::start(folder, served, launch));
-    Ok(started.map_or_else(|e| without_jobs(e.to_string()), |(jobs, supervision)| (jobs, Some(supervision))))
+    let started = launch.and_then(|launch| Jobs::start(folder, served, launch, args.keep()));
+    Ok(started
+        .map_or_else(|e| without_jobs(&e.to_string(), e.to_string()), |(jobs, supervision)| (jobs, Some(supervision))))
 }
 
 fn data_path(args: &ServeArgs) -> Result<PathBuf, String> {
     args.data.clone().map_or_else(|| default_path(&args.bus.session), Ok)
 }
 
-fn without_jobs(problem: String) -> (Jobs, Option<Supervision>) {
+/// `told` goes to clients, `problem` to the log.
+fn without_jobs(problem: &str, told: String) -> (Jobs, Option<Supervision>) {
     tracing::warn!("no jobs: {problem}");
-    (Jobs::unavailable(problem), None)
+    (Jobs::unavailable(told), None)
 }
 
 /// Why the daemon ends.

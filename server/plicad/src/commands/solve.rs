@@ -5,7 +5,10 @@ use std::path::Path;
 use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use plica_accurate::SolveError;
+use plica_geometry::HexMesh;
 use plica_scene::case::{Case, Failure, LoadStep, News, Problem, Reading, Solution, follow, write_result};
+use plica_scene::extents;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -33,6 +36,7 @@ struct Info {
     n_hexes: usize,
     n_nodes: usize,
     n_unknowns: usize,
+    extents_m: [f64; 3],
     n_factor_values: usize,
     iterations: u32,
     indefinite_steps: u32,
@@ -52,7 +56,7 @@ pub fn run(args: &SolveArgs, json: bool) -> anyhow::Result<()> {
     let bar = bar()?;
     let solution = follow(&problem, &case.solve(), &mut |news| show(&bar, news));
     bar.finish_and_clear();
-    let solution = solution.map_err(|failure| advise(failure, &args.case))?;
+    let solution = solution.map_err(|failure| advise(failure, &problem, &args.case))?;
     if let Some(out) = &args.out {
         write_result(out, &problem, &solution)?;
     }
@@ -95,11 +99,19 @@ fn show(bar: &ProgressBar, news: News) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-fn advise(failure: Failure, case: &Path) -> anyhow::Error {
+/// What helps in this case; nothing that it has already.
+fn advise(failure: Failure, problem: &Problem, case: &Path) -> anyhow::Error {
     let advice = match &failure {
-        Failure::Stuck { .. } => {
+        Failure::Stuck { error: SolveError::Singular { .. }, .. } => "hold more nodes or axes",
+        Failure::Stuck { .. } if problem.is_linear() => {
+            "a linear case needs one Newton step: loosen solve.tolerance, and look for hexahedra of extreme shape or stiffness"
+        }
+        Failure::Stuck { .. } if problem.may_collapse() => {
             "look at the state with smaller loads, raise solve.steps or solve.max_halvings, refine the mesh where it folds, \
              or take the stable Neo-Hookean material"
+        }
+        Failure::Stuck { .. } => {
+            "look at the state with smaller loads, raise solve.steps or solve.max_halvings, or refine the mesh where it folds"
         }
         Failure::Solve(_) => "use fewer hexahedra",
     };
@@ -112,6 +124,7 @@ impl Info {
             n_hexes: problem.mesh().n_hexes(),
             n_nodes: problem.mesh().n_nodes(),
             n_unknowns: solution.n_unknowns,
+            extents_m: extents_m(problem.mesh()),
             n_factor_values: solution.n_factor_values,
             iterations: solution.iterations(),
             indefinite_steps: solution.indefinite_steps(),
@@ -122,21 +135,29 @@ impl Info {
     }
 }
 
+fn extents_m(mesh: &HexMesh) -> [f64; 3] {
+    let [lower, upper] = mesh.bounds();
+    (upper - lower).into()
+}
+
 fn warnings(problem: &Problem, solution: &Solution) -> Vec<String> {
+    let mut warnings = problem.remarks().to_vec();
     match solution.smallest_jacobian() {
         Some(j) if j < LEAST_JACOBIAN && !problem.is_linear() => {
-            vec![format!(
+            warnings.push(format!(
                 "an element is squeezed to det F = {j:.3}: below {LEAST_JACOBIAN} the result is not to be trusted"
-            )]
+            ));
         }
-        _ => Vec::new(),
+        _ => {}
     }
+    warnings
 }
 
 fn print(report: &Report, readings: &[(String, Reading)]) {
     let Info { n_hexes, n_nodes, n_unknowns, .. } = report.info;
     println!("case       {}: {n_hexes} hexahedra, {n_nodes} nodes, {n_unknowns} unknowns", report.case);
     let info = &report.info;
+    println!("extents    {}", extents::in_mm(info.extents_m));
     println!(
         "solve      {} load steps ({} more failed and were halved), {} Newton steps, {} of them indefinite",
         info.load_steps.len(),

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use plica_jobs::by_hand::{self, JobOptions};
 use plica_scene::Config;
-use plica_scene::setup::setup;
+use plica_scene::setup::{SetupError, setup};
 use plica_training::{DatabaseKind, TrainingFolder, TrainingJob, TrainingReport, default_threads, write_atomically};
 
 use crate::cli::{TrainArgs, TrainKind};
@@ -73,12 +73,24 @@ fn run_job(root: &Path, threads: Option<u32>, json: bool) -> anyhow::Result<()> 
     let config = Config::from_file(&folder.paths().scene())?;
     let n_threads = threads.or(job.threads).unwrap_or_else(default_threads);
     let mut watch = ToLog::new(ending, job.kind.name());
-    let report = work(&config, &job, &folder, n_threads as usize, &mut |p| watch.observe(&p))?;
+    let result = work(&config, &job, &folder, n_threads as usize, &mut |p| watch.observe(&p));
+    let report = result.map_err(without_content)?;
     watch.done(&report);
     if json {
         println!("{}", summary(&report, &folder.paths().database(), root)?);
     }
     Ok(())
+}
+
+/// The last line of a job's log goes to clients, who may have named a file that they cannot read: its words stay in the log.
+fn without_content(error: anyhow::Error) -> anyhow::Error {
+    match error.downcast_ref() {
+        Some(SetupError::Motion { object, source }) => {
+            eprintln!("plicad: {error}");
+            anyhow::anyhow!("objects.{object}.training.recorded: {}", source.without_content())
+        }
+        _ => error,
+    }
 }
 
 /// Runs a job; all commands that train call this.

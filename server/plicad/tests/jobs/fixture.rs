@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use plica_client::protocol::jobs::{Job, JobKind, JobState, JobSubmitRequest};
-use plica_jobs::{DataFolder, Jobs, Launch, Priority, ServedScene, Supervision};
+use plica_jobs::{DataFolder, Jobs, Keep, Launch, Priority, ServedScene, Supervision};
 use plica_scene::BUILT_IN_SCENE;
 use tempfile::TempDir;
 
@@ -34,12 +34,21 @@ pub(crate) struct Workplace {
     pub(crate) avoid_cpu: Option<usize>,
     /// How long a process that was asked to stop may take.
     pub(crate) grace: Duration,
+    /// Finished jobs that are kept.
+    pub(crate) keep: Keep,
 }
 
 impl Workplace {
     pub(crate) fn new(script: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let workplace = Self { folder, launcher: None, priority: Priority::Normal, avoid_cpu: None, grace: GRACE };
+        let workplace = Self {
+            folder,
+            launcher: None,
+            priority: Priority::Normal,
+            avoid_cpu: None,
+            grace: GRACE,
+            keep: Keep::default(),
+        };
         workplace.replace_script(script);
         workplace
     }
@@ -81,7 +90,7 @@ impl Workplace {
         };
         let served = ServedScene { name: "wedge".to_owned(), folder: None, text: BUILT_IN_SCENE.to_owned() };
         let folder = DataFolder::open(&self.path(""), "main").unwrap();
-        let (jobs, supervision) = Jobs::start(folder, served, launch).unwrap();
+        let (jobs, supervision) = Jobs::start(folder, served, launch, self.keep).unwrap();
         Daemon { jobs, supervision: Some(supervision) }
     }
 }

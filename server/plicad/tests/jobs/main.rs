@@ -11,7 +11,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use plica_client::protocol::jobs::{JobFetchRequest, JobFile, JobKind, JobState, JobSubmitRequest};
-use plica_jobs::Priority;
+use plica_jobs::{Keep, Priority};
 use serde_json::Value;
 
 use fixture::{Workplace, wait_for_file, wait_until};
@@ -103,7 +103,10 @@ fn a_folder_that_cannot_be_written_fails_the_job() {
         fs::write(workplace.in_job(&first, "go"), "").unwrap();
         daemon.wait_for(&first, JobState::Done);
         let reason = daemon.wait_for(&second, JobState::Failed).reason.unwrap();
-        assert!(reason.contains(&second) && reason.contains("cannot be written"), "{reason}");
+        assert!(
+            reason.contains("cannot be written") && !reason.contains(workplace.path("").to_str().unwrap()),
+            "{reason}"
+        );
         fs::remove_dir(workplace.in_job(&second, obstacle)).unwrap();
         fs::write(workplace.in_job(&second, "go"), "").unwrap();
         daemon.jobs.resume(&second).unwrap();
@@ -362,4 +365,78 @@ fn a_job_whose_daemon_is_gone_does_not_start() {
     let output = Command::new(plicad).args(child).output().unwrap();
     assert!(!output.status.success() && output.stdout.is_empty());
     assert!(String::from_utf8_lossy(&output.stderr).contains("the daemon that started this job is gone"));
+}
+
+#[test]
+fn finished_jobs_beyond_the_bounds_are_removed_cancelled_ones_first() {
+    let mut workplace = Workplace::new("finish");
+    workplace.keep = Keep { jobs: 3, ..Keep::default() };
+    let daemon = workplace.open();
+    let done = |name: &str| daemon.wait_for(&daemon.submit(name).id, JobState::Done).id;
+    let first = done("first");
+    assert!(daemon.jobs.begin_use(&first).is_ok());
+    daemon.jobs.end_use(true);
+    let second = done("second");
+    workplace.replace_script("sleep 60");
+    let cancelled = daemon.submit("cancelled").id;
+    daemon.jobs.cancel(&cancelled).unwrap();
+    workplace.replace_script("finish");
+    let last = ["third", "fourth", "fifth"].map(done);
+    let left = || -> Vec<String> { daemon.jobs.list().unwrap().jobs.into_iter().map(|job| job.id).collect() };
+    let expected = [first.clone(), last[1].clone(), last[2].clone()];
+    wait_until("old jobs to be removed", || (left() == expected).then_some(()));
+    assert_eq!(daemon.jobs.list().unwrap().removed, 3);
+    for id in [&second, &cancelled, &last[0]] {
+        wait_until("its folder to go", || (!workplace.path("jobs").join(id).exists()).then_some(()));
+        let message = daemon.jobs.get(id).unwrap_err().to_string();
+        assert!(message.contains("any more"), "{message}");
+    }
+    // A client id is free again with its job.
+    assert!(daemon.jobs.submit(&JobSubmitRequest::new("second", JobKind::Training)).unwrap().created);
+    daemon.stop();
+}
+
+#[test]
+fn bytes_of_finished_jobs_are_bounded_and_unfinished_ones_have_as_much_room() {
+    let mut workplace =
+        Workplace::new("head -c 60000 /dev/zero >$dir/database.safetensors; printf '{}' >$dir/report.json");
+    workplace.keep = Keep { jobs: 100, bytes: 200_000 };
+    let daemon = workplace.open();
+    for name in ["a", "b", "c", "d", "e", "f"] {
+        daemon.wait_for(&daemon.submit(name).id, JobState::Done);
+    }
+    wait_until("old jobs to be removed", || (daemon.jobs.list().unwrap().removed >= 3).then_some(()));
+    assert!(daemon.jobs.list().unwrap().jobs.len() >= 2);
+    workplace.replace_script("sleep 60");
+    let refused =
+        (0..100).find_map(|i| daemon.jobs.submit(&JobSubmitRequest::new(format!("q{i}"), JobKind::Training)).err());
+    let refused = refused.unwrap();
+    assert!(
+        refused.code == "too_many_jobs" && refused.message.contains("at most 200000 are kept"),
+        "{}",
+        refused.message
+    );
+    daemon.stop();
+}
+
+#[test]
+fn job_10000_comes_after_9999_and_older_folders_stay_valid() {
+    let workplace = Workplace::new("finish");
+    let daemon = workplace.open();
+    let first = daemon.submit("first").id;
+    daemon.wait_for(&first, JobState::Done);
+    daemon.stop();
+    let folder = workplace.path("jobs").join("9999");
+    fs::rename(workplace.path("jobs").join(&first), &folder).unwrap();
+    let job = fs::read_to_string(folder.join("job.json")).unwrap();
+    fs::write(folder.join("job.json"), job.replace("\"0001\"", "\"9999\"")).unwrap();
+    // No job has that number.
+    fs::create_dir(workplace.path("jobs").join("4294967295")).unwrap();
+    let daemon = workplace.open();
+    let second = daemon.submit("second").id;
+    assert_eq!(second, "10000");
+    let listed: Vec<_> = daemon.jobs.list().unwrap().jobs.into_iter().map(|job| job.id).collect();
+    assert_eq!(listed, ["9999", "10000"]);
+    daemon.wait_for(&second, JobState::Done);
+    daemon.stop();
 }

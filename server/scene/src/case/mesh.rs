@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use nalgebra::Point3;
-use plica_geometry::import::{Groups, ImportError, NamedMesh, read_mesh};
+use plica_geometry::import::{Groups, ImportError, NamedMesh, ReadOptions, read_mesh};
 use plica_geometry::shapes::{Hexahedron, Wedge, hexahedron};
 
 use super::raw::{RawGenerator, RawMesh};
@@ -23,12 +23,20 @@ pub enum MeshSource {
     File {
         /// Path, resolved.
         path: PathBuf,
-        /// Metres per unit of the file.
-        metres_per_unit: f64,
+        /// Unit and joining of nodes.
+        options: ReadOptions,
     },
 }
 
 impl MeshSource {
+    /// The key that sets the size of the mesh, and whether it is the unit of a file.
+    pub(super) fn size_key(&self) -> (&'static str, bool) {
+        match self {
+            Self::Generated(_) => ("mesh", false),
+            Self::File { .. } => ("mesh.metres_per_unit", true),
+        }
+    }
+
     /// Generates or reads the mesh.
     pub(super) fn load(&self, document: &Document) -> Result<NamedMesh, ConfigError> {
         match self {
@@ -37,9 +45,9 @@ impl MeshSource {
                     let advice = "list the corners counter-clockwise around the bottom, then around the top";
                     document.error("mesh.corners_m", e.to_string(), advice)
                 })?;
-                Ok(NamedMesh { mesh, groups: Groups::default() })
+                Ok(NamedMesh { mesh, groups: Groups::default(), remarks: Vec::new() })
             }
-            Self::File { path, metres_per_unit } => read_mesh(path, *metres_per_unit).map_err(|e| {
+            Self::File { path, options } => read_mesh(path, *options).map_err(|e| {
                 let ImportError { path, place, problem, advice } = e;
                 document.error("mesh.file", format!("{}{place}: {problem}", path.display()), advice)
             }),
@@ -51,13 +59,17 @@ pub(super) fn check(c: &Check<'_>, raw: &RawMesh) -> Result<MeshSource, ConfigEr
     match (raw.generator, &raw.file) {
         (Some(generator), None) => {
             c.absent("mesh.metres_per_unit", &raw.metres_per_unit, "a generator")?;
+            c.absent("mesh.merge_tolerance_m", &raw.merge_tolerance_m, "a generator")?;
             check_shape(c, raw, generator).map(|shape| MeshSource::Generated(Box::new(shape)))
         }
         (None, Some(file)) => {
             check_no_shape(c, raw)?;
             let folder = c.document().file().parent().map(PathBuf::from).unwrap_or_default();
-            let metres_per_unit = raw.metres_per_unit.unwrap_or(1.0);
-            Ok(MeshSource::File { path: folder.join(file), metres_per_unit })
+            let options = ReadOptions {
+                metres_per_unit: raw.metres_per_unit.unwrap_or(1.0),
+                merge_tolerance_m: raw.merge_tolerance_m,
+            };
+            Ok(MeshSource::File { path: folder.join(file), options })
         }
         _ => Err(c.error(
             "mesh",

@@ -11,6 +11,7 @@ use super::support::{self, Support};
 use super::{held, select};
 use crate::document::Document;
 use crate::error::ConfigError;
+use crate::extents::{self, Size};
 
 /// A mesh with materials, supports, loads and probes.
 #[derive(Debug)]
@@ -18,6 +19,8 @@ pub struct Problem {
     mesh: NamedMesh,
     solid: Solid,
     is_linear: bool,
+    may_collapse: bool,
+    remarks: Vec<String>,
     /// Region of each hexahedron: 0 for the base material, else one more than the region's index in the file.
     region_of_hex: Vec<usize>,
     supports: Vec<Support>,
@@ -44,7 +47,9 @@ impl Problem {
     /// body free to move.
     pub fn new(case: &Case) -> Result<Self, ConfigError> {
         let document = &case.document;
-        let mesh = case.mesh.load(document)?;
+        let mut mesh = case.mesh.load(document)?;
+        let mut remarks = std::mem::take(&mut mesh.remarks);
+        check_extents(case, &mesh.mesh, &mut remarks)?;
         let (solid, region_of_hex) = make_solid(case, &mesh)?;
         let supports = support::find(document, &case.supports, &mesh)?;
         held::check(document, &mesh.mesh, &supports)?;
@@ -55,7 +60,8 @@ impl Problem {
         let probes = probes.map(|(i, probe)| probe.resolve(document, &format!("probes.{i}"), &mesh));
         let probes = probes.collect::<Result<_, _>>()?;
         let is_linear = case.materials().all(|material| material.model == MaterialModel::Linear);
-        Ok(Self { mesh, solid, is_linear, region_of_hex, supports, loads, probes })
+        let may_collapse = case.materials().any(|m| m.model == MaterialModel::CompressibleNeoHookean);
+        Ok(Self { mesh, solid, is_linear, may_collapse, remarks, region_of_hex, supports, loads, probes })
     }
 
     /// The mesh at rest.
@@ -71,6 +77,16 @@ impl Problem {
     /// Whether all materials are linear, so that `det F` is no measure of the result.
     pub fn is_linear(&self) -> bool {
         self.is_linear
+    }
+
+    /// Whether a material resists collapse less than the stable Neo-Hookean one does.
+    pub fn may_collapse(&self) -> bool {
+        self.may_collapse
+    }
+
+    /// Sentences about the mesh that its user should read.
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
     }
 
     /// Region of each hexahedron: 0 for the base material, else one more than the region's index in the file.
@@ -124,6 +140,22 @@ impl Problem {
 /// Elasticity and loads as energies of the solver.
 pub(super) fn energies<'a>(solid: &'a Solid, loads: &'a [Box<dyn Energy>]) -> Vec<&'a dyn Energy> {
     std::iter::once(solid as &dyn Energy).chain(loads.iter().map(Box::as_ref)).collect()
+}
+
+/// Refuses a mesh of impossible extents, and tells unusual ones.
+fn check_extents(case: &Case, mesh: &HexMesh, remarks: &mut Vec<String>) -> Result<(), ConfigError> {
+    let [lower, upper] = mesh.bounds();
+    let (key, is_file) = case.mesh.size_key();
+    match extents::judge("the body", key, (upper - lower).into()) {
+        Size::Impossible(problem) if is_file => {
+            Err(case.document.error(key, problem, "give 1e-3 for a file in mm, 1 for one in m"))
+        }
+        Size::Doubtful(doubt) | Size::Impossible(doubt) => {
+            remarks.push(doubt);
+            Ok(())
+        }
+        Size::Plausible => Ok(()),
+    }
 }
 
 fn make_solid(case: &Case, mesh: &NamedMesh) -> Result<(Solid, Vec<usize>), ConfigError> {

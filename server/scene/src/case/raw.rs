@@ -71,6 +71,10 @@ pub struct RawMesh {
     /// Metres per unit of the file.
     #[schemars(range(min = 1e-9, max = 1e3))]
     pub metres_per_unit: Option<f64>,
+    /// Nodes of the file closer than this become one [m]. Left out, parts that touch without sharing nodes are an error; 0 keeps
+    /// them apart, with a warning.
+    #[schemars(range(min = 0.0, max = 0.1))]
+    pub merge_tolerance_m: Option<f64>,
 }
 
 /// Generators of shapes.

@@ -26,6 +26,12 @@ pub struct Keyframe {
 }
 
 impl BenchConfig {
+    /// A straight motion of one tool from a pose at rest to another one, where it stays.
+    pub fn press(tool: usize, from: Isometry3<f64>, to: Isometry3<f64>, [reached_s, end_s]: [f64; 2]) -> Self {
+        let key = |time_s, pose| Keyframe { tool, time_s, pose };
+        Self { keyframes: vec![key(0.0, from), key(reached_s, to), key(end_s, to)], full_press_s: None }
+    }
+
     /// Keyframes in order of time, of all tools.
     pub fn keyframes(&self) -> &[Keyframe] {
         &self.keyframes

@@ -2,8 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use nalgebra::Point3;
+use plica_geometry::import::{ObjPart, parse_obj_parts};
+use plica_training::RegularFile;
+
 use super::raw::{RawConfig, RawShape};
-use crate::document::Document;
 
 /// A file that a scene names.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,11 +21,23 @@ pub struct SceneFile {
     pub metres_per_unit: Option<f64>,
 }
 
-/// Files that the text of a scene names, none of them read; empty if the text is not a scene. `file` resolves relative paths.
-pub fn named_files(file: &Path, text: &str) -> Vec<SceneFile> {
-    let document = Document::parse(file, text);
-    let listed = document.and_then(|document| Ok(list(document.file(), &document.read()?)));
-    listed.unwrap_or_default()
+/// Largest file that a scene may name.
+pub const MAX_FILE_BYTES: u64 = 64 << 20;
+
+/// Source of meshes: the parts in a file of a unit \[m\], or a sentence.
+pub(super) type Parts<'a> = &'a dyn Fn(&Path, f64) -> Result<Vec<ObjPart>, String>;
+
+/// The parts in an OBJ file.
+pub(super) fn read_parts(path: &Path, metres_per_unit: f64) -> Result<Vec<ObjPart>, String> {
+    let bytes = RegularFile::open(path, MAX_FILE_BYTES).and_then(RegularFile::read).map_err(|e| e.to_string())?;
+    parse_obj_parts(&bytes, metres_per_unit)
+}
+
+/// One part with a volume, in place of a file that is not to be opened.
+pub(super) fn stand_in(_: &Path, _: f64) -> Result<Vec<ObjPart>, String> {
+    let corners = [[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.01]];
+    let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+    Ok(vec![ObjPart { name: "part 1".into(), points: corners.map(Point3::from).to_vec(), triangles }])
 }
 
 /// All files that belong to a scene: each key of type [`RawFile`](super::raw::RawFile).
@@ -52,6 +67,7 @@ mod tests {
     use serde_json::Value;
 
     use super::*;
+    use crate::scene::Config;
     use crate::scene::raw::RawConfig;
 
     const SCENE: &str = r#"
@@ -86,7 +102,7 @@ shape = { mesh = { file = "fork.obj" } }
     #[test]
     fn every_key_of_the_type_file_is_listed_and_no_other() {
         let schema = serde_json::to_value(schemars::schema_for!(RawConfig)).expect("a schema is JSON");
-        let listed = named_files(Path::new("scenes/fork.toml"), SCENE);
+        let listed = Config::files_of(Path::new("scenes/fork.toml"), SCENE).expect("a scene");
         let paths: Vec<_> = listed.iter().map(|file| file.path.display().to_string()).collect();
         assert_eq!(paths, ["scenes/fork.obj", "scenes/press.csv"]);
         let keys = file_keys(&schema);

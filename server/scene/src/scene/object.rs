@@ -11,8 +11,8 @@ use plica_sim::{ElementKind, Material, Plane, Preconditioner, SolverOptions};
 use super::accurate::{self, AccurateConfig};
 use super::material::{self, Region};
 use super::raw::{
-    RawElement, RawEmbedding, RawFace, RawFormat, RawGenerator, RawMesh, RawObject, RawPlane, RawPreconditioner,
-    RawPublish, RawSkin, RawSolver, RawSupports,
+    RawBox, RawElement, RawEmbedding, RawFace, RawFormat, RawGenerator, RawMesh, RawObject, RawPlane,
+    RawPreconditioner, RawPublish, RawSkin, RawSolver, RawSupports,
 };
 use crate::checks::Check;
 use crate::error::ConfigError;
@@ -33,6 +33,7 @@ pub struct ObjectConfig {
     regions: Vec<Region>,
     fixed: FixedConfig,
     planes: Vec<Plane>,
+    bounds_m: Option<[Point3<f64>; 2]>,
     element: ElementKind,
     substeps: u32,
     solver: SolverOptions,
@@ -133,6 +134,10 @@ impl ObjectConfig {
     pub fn planes(&self) -> &[Plane] {
         &self.planes
     }
+    /// Lower and upper corner of the box that the object may move in \[m\], where the scene has one.
+    pub fn bounds_m(&self) -> Option<[Point3<f64>; 2]> {
+        self.bounds_m
+    }
     /// Element whose stiffness is precomputed.
     pub fn element(&self) -> ElementKind {
         self.element
@@ -185,13 +190,14 @@ pub(super) fn check(c: &Check<'_>, objects: &BTreeMap<String, RawObject>) -> Res
     Ok(ObjectConfig {
         name: name.to_owned(),
         skin: check_skin(c, &format!("{key}.skin"), &raw.skin, &mesh)?,
-        mesh,
         divisions,
         material,
         mass_damping_per_s: raw.material.mass_damping_per_s,
         regions: material::check_regions(c, &format!("{key}.regions"), &raw.regions, material, accurate.material)?,
         fixed,
         planes,
+        bounds_m: check_bounds(c, &format!("{key}.supports.bounds"), raw.supports.bounds.as_ref(), &mesh)?,
+        mesh,
         element: match raw.coarse.element {
             RawElement::EnhancedStrain => ElementKind::EnhancedStrain,
             RawElement::FullIntegration => ElementKind::FullIntegration,
@@ -254,6 +260,28 @@ fn check_supports(c: &Check<'_>, key: &str, raw: &RawSupports) -> Result<(FixedC
         Ok(Plane { point_m: p.point_m.into(), normal })
     };
     Ok((fixed, raw.planes.iter().enumerate().map(plane).collect::<Result<_, _>>()?))
+}
+
+/// Bounds have the object at rest inside.
+fn check_bounds(
+    c: &Check<'_>,
+    key: &str,
+    raw: Option<&RawBox>,
+    mesh: &MeshConfig,
+) -> Result<Option<[Point3<f64>; 2]>, ConfigError> {
+    let Some(raw) = raw else { return Ok(None) };
+    let [low, high] = c.corners(key, raw.min_m, raw.max_m)?;
+    let extents = mesh.extents_m();
+    for k in 0..3 {
+        let is_below = low[k] >= 0.0;
+        if is_below || high[k] <= extents[k] {
+            let (corner, value) = if is_below { ("min_m", raw.min_m) } else { ("max_m", raw.max_m) };
+            let problem = format!("{value:?} leaves no room around the object, which spans 0 to {extents:?} m");
+            let advice = "enlarge the box so that the object lies inside with room to move, or leave `bounds` out";
+            return Err(c.error(&format!("{key}.{corner}"), problem, advice));
+        }
+    }
+    Ok(Some([low, high]))
 }
 
 fn face(raw: RawFace) -> Face {

@@ -156,6 +156,8 @@ pub struct RawSupports {
     pub fixed: RawFixed,
     /// Immovable half-spaces that the skin may rest on.
     pub planes: Vec<RawPlane>,
+    /// Box that the object may move in; once out, it is put back.
+    pub bounds: Option<RawBox>,
 }
 
 /// Coarse nodes that never move.

@@ -2,36 +2,53 @@
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
+use std::path::Path;
 
-use nalgebra::{Isometry3, Point3, Translation3};
-use plica_geometry::import::read_obj_parts;
-use plica_geometry::{ConvexPolytope, HullError};
+use nalgebra::{Isometry3, Point3, Translation3, Vector3};
+use plica_geometry::import::ObjPart;
+use plica_geometry::{ConvexPolytope, HullError, hull_stand_off};
 use plica_sim::{Coupling, Sampling, SpringCoupling, ToolDescription, ToolShape};
 
+use super::files::Parts;
 use super::raw::{RawCoupling, RawSampling, RawShape, RawTool, RawTransform};
 use crate::checks::Check;
 use crate::error::ConfigError;
+use crate::extents::{self, Size};
 
 /// Most tools of a scene.
 const MAX_TOOLS: usize = 16;
 /// Least and largest number of points of a convex hull.
 const HULL_POINTS: RangeInclusive<usize> = 4..=1000;
 
-/// All tools in alphabetical order.
-pub(super) fn check(c: &Check<'_>, tools: &BTreeMap<String, RawTool>) -> Result<Vec<ToolDescription>, ConfigError> {
+/// A part whose hull stands further off its surface than this share of its extent is not convex.
+const CONVEX: f64 = 5e-3;
+
+/// All tools in alphabetical order; sentences for their users go to `remarks`.
+pub(super) fn check(
+    c: &Check<'_>,
+    tools: &BTreeMap<String, RawTool>,
+    parts: Parts<'_>,
+    remarks: &mut Vec<String>,
+) -> Result<Vec<ToolDescription>, ConfigError> {
     if tools.len() > MAX_TOOLS {
         let problem = format!("{} tools; the allowed range is 0 to {MAX_TOOLS}", tools.len());
         return Err(c.error("tools", problem, "remove tools, or run a second daemon with another --session"));
     }
-    tools.iter().map(|(name, raw)| check_tool(c, name, raw)).collect()
+    tools.iter().map(|(name, raw)| check_tool(c, name, raw, parts, remarks)).collect()
 }
 
-fn check_tool(c: &Check<'_>, name: &str, raw: &RawTool) -> Result<ToolDescription, ConfigError> {
+fn check_tool(
+    c: &Check<'_>,
+    name: &str,
+    raw: &RawTool,
+    parts: Parts<'_>,
+    remarks: &mut Vec<String>,
+) -> Result<ToolDescription, ConfigError> {
     let key = |k: &str| format!("tools.{name}.{k}");
     c.name(&format!("tools.{name}"), name)?;
     Ok(ToolDescription {
         name: name.to_owned(),
-        shape: check_shape(c, &key("shape"), &raw.shape)?,
+        shape: check_shape(c, &key("shape"), &raw.shape, parts, remarks)?,
         coupling: check_coupling(c, &key, raw)?,
         friction: raw.friction,
         sampling: check_sampling(c, &key, raw)?,
@@ -49,7 +66,13 @@ fn check_transform(c: &Check<'_>, key: &str, raw: &RawTransform) -> Result<Isome
     Ok(Isometry3::from_parts(translation, rotation))
 }
 
-fn check_shape(c: &Check<'_>, key: &str, raw: &RawShape) -> Result<ToolShape, ConfigError> {
+fn check_shape(
+    c: &Check<'_>,
+    key: &str,
+    raw: &RawShape,
+    parts: Parts<'_>,
+    remarks: &mut Vec<String>,
+) -> Result<ToolShape, ConfigError> {
     match raw {
         RawShape::Ball { radius_m } => Ok(ToolShape::Ball { radius_m: *radius_m }),
         RawShape::Capsule { radius_m, length_m } => Ok(ToolShape::Capsule { radius_m: *radius_m, length_m: *length_m }),
@@ -66,19 +89,56 @@ fn check_shape(c: &Check<'_>, key: &str, raw: &RawShape) -> Result<ToolShape, Co
             Ok(ToolShape::ConvexHull { polytope: polytope.map_err(flat)? })
         }
         RawShape::Mesh { file, metres_per_unit } => {
-            let key = format!("{key}.mesh");
-            let path = c.document().file().parent().unwrap_or(std::path::Path::new("")).join(&file.0);
-            let hulls = read_obj_parts(&path, *metres_per_unit).map_err(|problem| {
-                c.error(&format!("{key}.file"), problem, "give an OBJ file whose groups are convex parts")
-            })?;
-            let polytopes = hulls.into_iter().map(ConvexPolytope::hull).collect::<Result<_, _>>();
-            let flat = |e: HullError| {
-                let problem = format!("{}: {e}", path.display());
-                c.error(&format!("{key}.file"), problem, "give an OBJ file whose groups have a volume each")
-            };
-            Ok(ToolShape::Compound { polytopes: polytopes.map_err(flat)? })
+            let path = c.document().file().parent().unwrap_or(Path::new("")).join(&file.0);
+            let read = parts(&path, *metres_per_unit);
+            mesh(c, &format!("{key}.mesh"), &file.0, read, remarks)
         }
     }
+}
+
+/// Hulls of the parts of an OBJ file, which is named as typed: a client of a daemon is not told its folders.
+fn mesh(
+    c: &Check<'_>,
+    key: &str,
+    typed: &str,
+    read: Result<Vec<ObjPart>, String>,
+    remarks: &mut Vec<String>,
+) -> Result<ToolShape, ConfigError> {
+    let file_key = format!("{key}.file");
+    let named = |problem: String| format!("{typed}: {problem}");
+    let parts =
+        read.map_err(|problem| c.error(&file_key, named(problem), "give an OBJ file whose groups are convex parts"))?;
+    let unit_key = format!("{key}.metres_per_unit");
+    match extents::judge("the tool", &unit_key, extents_m(parts.iter().flat_map(|part| &part.points))) {
+        Size::Plausible => {}
+        Size::Doubtful(doubt) => remarks.push(format!("{file_key}: {doubt}")),
+        Size::Impossible(problem) => return Err(c.error(&unit_key, problem, "give 1e-3 for a file in mm")),
+    }
+    let hull = |(i, part): (usize, ObjPart)| {
+        let polytope = ConvexPolytope::hull(part.points.clone()).map_err(|e: HullError| {
+            let problem = named(format!("part {}: {e}", i + 1));
+            c.error(&file_key, problem, "give an OBJ file whose groups have a volume each")
+        })?;
+        let off = hull_stand_off(&polytope, &part.points, &part.triangles);
+        let extent = Vector3::from(extents_m(&part.points)).norm();
+        if off > CONVEX * extent {
+            remarks.push(format!(
+                "{file_key}: part `{}` is not convex: its convex hull touches in its place and stands up to {:.2} mm off its \
+                 surface; split it into convex parts, each a group of its own (`o NAME`), by hand or with CoACD or V-HACD",
+                part.name,
+                1e3 * off
+            ));
+        }
+        Ok(polytope)
+    };
+    Ok(ToolShape::Compound { polytopes: parts.into_iter().enumerate().map(hull).collect::<Result<_, _>>()? })
+}
+
+/// Extents of the box around points \[m\].
+fn extents_m<'a>(points: impl IntoIterator<Item = &'a Point3<f64>>) -> [f64; 3] {
+    let none = [Point3::from(Vector3::repeat(f64::MAX)), Point3::from(Vector3::repeat(f64::MIN))];
+    let [low, high] = points.into_iter().fold(none, |[low, high], p| [low.inf(p), high.sup(p)]);
+    (high - low).into()
 }
 
 fn check_coupling(c: &Check<'_>, key: &dyn Fn(&str) -> String, raw: &RawTool) -> Result<Coupling, ConfigError> {

@@ -7,7 +7,7 @@
 use plica_geometry::CLUSTER_SIZE;
 
 use super::V3;
-use super::solid::{Placement, Solid, nearest_on_segment, nearest_segments};
+use super::solid::{NumberedVertex, Placement, Solid, nearest_on_segment, nearest_segments};
 use super::surface::SkinSurface;
 use crate::embedding::SkinPositions;
 
@@ -260,18 +260,17 @@ impl Detector {
                         }
                     }
                     Solid::Polytopes(parts) => {
-                        for (k, part) in parts.iter().enumerate() {
+                        for part in parts {
                             let center = placement.to_world(part.center);
-                            for (corner, point) in part.vertices.iter().enumerate() {
-                                let point = placement.to_world(*point);
+                            part.vertices_below(placement, &corners, reach, |vertex| {
+                                let NumberedVertex { position, number } = vertex;
                                 let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-                                let depth = (center - point).dot(&normal) / normal.norm();
+                                let depth = (center - position).dot(&normal) / normal.norm();
                                 if depth > 0.0 {
-                                    let number = (k << 12) + corner;
-                                    let point = ToolPoint { position: point, radius: 0.0, depth, number };
+                                    let point = ToolPoint { position, radius: 0.0, depth, number };
                                     self.under_tool_point(search, t, &corners, &point);
                                 }
-                            }
+                            });
                         }
                     }
                     Solid::HalfSpace { .. } => {}

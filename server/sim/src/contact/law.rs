@@ -1,7 +1,7 @@
 //! The contact law of a row, and how its state changes between passes and ticks.
 //!
 //! Augmented Lagrangian, `u` the displacement of the skin against the tool in this step, `T = I - n n^T`:
-//! `f_n = lambda_n - k (g + n . u)` and, with the trial force `t = lambda_t - k (s + T u)`, `f_t = beta t`,
+//! `f_n = lambda_n - k_n (g + n . u)` and, with the trial force `t = lambda_t - k (s + T u)`, `f_t = beta t`,
 //! `beta = min(1, mu f_n / |t|)`: radial return onto the cone \[SH98, ch. 2\], whose secant `beta` is fixed within a pass.
 //! A row sticks while `beta = 1`. Inside the linear solve `f_n` is not cut at zero; a row that pulls is switched off and
 //! the solve goes on without it.
@@ -21,18 +21,18 @@ impl Row {
         if self.friction > 0.0 { self.contact.secant * self.stiffness } else { 0.0 }
     }
 
-    /// `D = -df/du = k n n^T + beta k T` \[N/m\].
+    /// `D = -df/du = k_n n n^T + beta k T` \[N/m\].
     #[inline(always)]
     pub(crate) fn stiffness_matrix(&self) -> M3 {
         let n = self.contact.normal;
         let t = self.tangential_stiffness();
-        M3::identity() * t + n * n.transpose() * (self.stiffness - t)
+        M3::identity() * t + n * n.transpose() * (self.normal_stiffness - t)
     }
 
     /// `f_n` at the present `u` \[N\].
     #[inline(always)]
     pub(crate) fn normal_force(&self) -> f32 {
-        self.contact.normal_force - self.stiffness * (self.gap + self.contact.normal.dot(&self.u))
+        self.contact.normal_force - self.normal_stiffness * (self.gap + self.contact.normal.dot(&self.u))
     }
 
     /// `t = lambda_t - k (s + T u)` at the present `u` \[N\].

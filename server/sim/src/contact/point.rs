@@ -5,7 +5,6 @@
 
 use super::V3;
 use super::detect::{Detector, Search};
-use super::solid::Solid;
 use super::surface::SkinSurface;
 use crate::embedding::SkinPositions;
 use crate::smoothstep::smoothstep;
@@ -30,7 +29,7 @@ pub(crate) fn contact_point(search: &Search<'_>, detector: &Detector) -> Option<
 fn on_axis(search: &Search<'_>, detector: &Detector) -> Option<ContactPoint> {
     let Search { surface, skin, solid, placement, .. } = *search;
     let direction = -(placement.rotation * V3::z());
-    let tip = tip_distance(solid);
+    let tip = solid.tip();
     let mut best: Option<(f32, ContactPoint)> = None;
     for &cluster in detector.near_clusters() {
         let margin = BAND + surface.longest_edge(cluster as usize);
@@ -49,15 +48,6 @@ fn on_axis(search: &Search<'_>, detector: &Detector) -> Option<ContactPoint> {
         }
     }
     best.map(|b| b.1)
-}
-
-/// Distance from the tool's origin to its surface along -z.
-fn tip_distance(solid: &Solid) -> f32 {
-    match solid {
-        Solid::Round { radius, .. } => *radius,
-        Solid::Polytopes(parts) => parts.iter().flat_map(|p| &p.vertices).map(|v| -v.z).fold(0.0, f32::max),
-        Solid::HalfSpace { .. } => 0.0,
-    }
 }
 
 /// Parameter and barycentric weights where the line meets the triangle \[MT97\].

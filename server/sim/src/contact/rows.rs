@@ -44,8 +44,10 @@ pub(crate) struct Row {
     pub(crate) arm: V3,
     /// Gap that the solve closes: measured gap less bias, bounded below \[m\].
     pub(crate) gap: f32,
-    /// Normal and sticking stiffness of the augmented Lagrangian \[N/m\].
+    /// Sticking stiffness `k` of the augmented Lagrangian \[N/m\].
     pub(crate) stiffness: f32,
+    /// Its normal stiffness `k_n` \[N/m\].
+    pub(crate) normal_stiffness: f32,
     pub(crate) friction: f32,
     /// `tr(J A_0^-1 J^T) / 3` at the point \[1/kg\].
     pub(crate) inverse_mass: f32,
@@ -242,6 +244,7 @@ impl Rows {
             arm: candidate.point - selection.origin,
             gap: (candidate.gap - contact.bias).max(-selection.max_correction),
             stiffness: 0.0,
+            normal_stiffness: 0.0,
             friction: selection.friction,
             max_force: carriers(candidate).map(|(v, w)| w * selection.surface.static_stiffness[v]).sum::<f32>()
                 * selection.max_press,

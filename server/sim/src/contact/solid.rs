@@ -2,8 +2,12 @@
 
 use plica_geometry::{ConvexPolytope, FacePlane};
 
+use super::support_tree::SupportTree;
 use super::{M3, V3};
 use crate::description::ToolShape;
+
+/// Up to this number of planes or vertices a loop over all of them is cheapest.
+const FEW: usize = 64;
 
 /// A shape in its own frame.
 #[derive(Debug, Clone)]
@@ -20,8 +24,24 @@ pub(crate) enum Solid {
 #[derive(Debug, Clone)]
 pub(crate) struct Polytope {
     planes: Vec<(V3, f32)>,
-    pub(crate) vertices: Vec<V3>,
+    vertices: Vec<V3>,
     pub(crate) center: V3,
+    /// Vertices of the parts before this one.
+    first_vertex: usize,
+    /// Farthest vertex from the origin \[m\].
+    reach: f32,
+    /// Farthest vertex along -z \[m\], at least 0.
+    tip: f32,
+    /// Of `n . x - o` over the planes, and of `d . v` over the vertices, where there are many.
+    plane_tree: Option<SupportTree>,
+    vertex_tree: Option<SupportTree>,
+}
+
+/// A vertex of a polytope and its number among those of all parts.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct NumberedVertex {
+    pub(crate) position: V3,
+    pub(crate) number: usize,
 }
 
 /// Pose of a shape, `world <- shape`.
@@ -53,7 +73,13 @@ impl Solid {
             }
             ToolShape::Cuboid { .. } | ToolShape::ConvexHull { .. } | ToolShape::Compound { .. } => {
                 let parts = shape.polytopes().ok()?;
-                Some(Self::Polytopes(parts.iter().map(Polytope::new).collect()))
+                let mut first_vertex = 0;
+                let table = |part: &ConvexPolytope| {
+                    let table = Polytope::new(part, first_vertex);
+                    first_vertex += table.vertices.len();
+                    table
+                };
+                Some(Self::Polytopes(parts.iter().map(table).collect()))
             }
         }
     }
@@ -78,7 +104,14 @@ impl Solid {
         };
         match self {
             Self::Round { a, b, radius } => [a, b].into_iter().for_each(|p| extend(*p, *radius)),
-            Self::Polytopes(parts) => parts.iter().flat_map(|p| &p.vertices).for_each(|p| extend(*p, 0.0)),
+            Self::Polytopes(parts) => {
+                for part in parts {
+                    match &part.vertex_tree {
+                        None => part.vertices.iter().for_each(|p| extend(*p, 0.0)),
+                        Some(tree) => part.extremes(tree, placement).into_iter().for_each(|p| extend(p, 0.0)),
+                    }
+                }
+            }
             Self::HalfSpace { .. } => return [-V3::repeat(f32::INFINITY), V3::repeat(f32::INFINITY)],
         }
         [low, high]
@@ -105,7 +138,16 @@ impl Solid {
     pub(crate) fn reach(&self) -> f32 {
         match self {
             Self::Round { a, b, radius } => a.norm().max(b.norm()) + radius,
-            Self::Polytopes(parts) => parts.iter().flat_map(|p| &p.vertices).map(|p| p.norm()).fold(0.0, f32::max),
+            Self::Polytopes(parts) => parts.iter().map(|part| part.reach).fold(0.0, f32::max),
+            Self::HalfSpace { .. } => 0.0,
+        }
+    }
+
+    /// Distance from the origin to the surface along -z \[m\].
+    pub(crate) fn tip(&self) -> f32 {
+        match self {
+            Self::Round { radius, .. } => *radius,
+            Self::Polytopes(parts) => parts.iter().map(|part| part.tip).fold(0.0, f32::max),
             Self::HalfSpace { .. } => 0.0,
         }
     }
@@ -113,36 +155,97 @@ impl Solid {
 
 impl Polytope {
     /// Table of `polytope` in `f32`: planes of the rounded vertices, with none of them above.
-    fn new(polytope: &ConvexPolytope) -> Self {
+    fn new(polytope: &ConvexPolytope, first_vertex: usize) -> Self {
         let vertices: Vec<V3> = polytope.vertices().iter().map(|v| v.coords.cast()).collect();
         let normal = |face: &FacePlane| {
             let [a, b, c] = polytope.triangles()[face.triangle].map(|v| vertices[v]);
             triangle_normal(&a, &b, &c).unwrap_or(face.normal.cast())
         };
         let support = |normal: &V3| vertices.iter().map(|v| normal.dot(v)).fold(f32::NEG_INFINITY, f32::max);
-        let planes = polytope.planes().iter().map(normal).map(|n| (n, support(&n))).collect();
+        let planes: Vec<_> = polytope.planes().iter().map(normal).map(|n| (n, support(&n))).collect();
         let center = vertices.iter().sum::<V3>() / vertices.len() as f32;
-        Self { planes, vertices, center }
+        let many = |functions: Vec<[f32; 4]>| (functions.len() > FEW).then(|| SupportTree::new(&functions));
+        Self {
+            reach: vertices.iter().map(|p| p.norm()).fold(0.0, f32::max),
+            tip: vertices.iter().map(|v| -v.z).fold(0.0, f32::max),
+            plane_tree: many(planes.iter().map(|(n, o)| [n.x, n.y, n.z, -o]).collect()),
+            vertex_tree: many(vertices.iter().map(|v| [v.x, v.y, v.z, 0.0]).collect()),
+            planes,
+            vertices,
+            center,
+            first_vertex,
+        }
     }
 
     /// Signed distance and outward normal of the nearest face; mitred outside edges, exact on and inside the surface.
     pub(crate) fn distance(&self, p: &V3) -> (f32, V3) {
-        let mut best = (f32::NEG_INFINITY, V3::z());
-        for (normal, offset) in &self.planes {
-            let d = normal.dot(p) - offset;
+        let (distance, plane) = self.nearest_plane(p);
+        (distance, self.planes.get(plane).map_or(V3::z(), |plane| plane.0))
+    }
+
+    /// Largest signed distance to a plane, and which; the first of equal ones.
+    fn nearest_plane(&self, p: &V3) -> (f32, usize) {
+        let signed = |(normal, offset): &(V3, f32)| normal.dot(p) - offset;
+        if let Some(tree) = &self.plane_tree {
+            let nearest = tree.largest([p.x, p.y, p.z, 1.0], |plane| signed(&self.planes[plane as usize]));
+            return (nearest.value, nearest.index as usize);
+        }
+        let mut best = (f32::NEG_INFINITY, usize::MAX);
+        for (index, plane) in self.planes.iter().enumerate() {
+            let d = signed(plane);
             if d > best.0 {
-                best = (d, *normal);
+                best = (d, index);
             }
         }
         best
+    }
+
+    /// Vertices that lie farthest along and against each axis of the world.
+    fn extremes(&self, tree: &SupportTree, placement: &Placement) -> [V3; 6] {
+        std::array::from_fn(|k| {
+            let axis = V3::ith(k / 2, if k % 2 == 0 { 1.0 } else { -1.0 });
+            let d = placement.rotation.tr_mul(&axis);
+            self.vertices[tree.largest([d.x, d.y, d.z, 0.0], |v| d.dot(&self.vertices[v as usize])).index as usize]
+        })
+    }
+
+    /// Calls `visit` with the vertices, in the frame of the world, that may lie in the prism below `corners`: of many, those on
+    /// the inner side of the triangle's edges and below `reach` above its plane, and some more.
+    pub(crate) fn vertices_below(
+        &self,
+        placement: &Placement,
+        corners: &[V3; 3],
+        reach: f32,
+        mut visit: impl FnMut(NumberedVertex),
+    ) {
+        let mut tell = |vertex: usize| {
+            let position = placement.to_world(self.vertices[vertex]);
+            visit(NumberedVertex { position, number: self.first_vertex + vertex });
+        };
+        let Some(tree) = &self.vertex_tree else { return (0..self.vertices.len()).for_each(tell) };
+        let [a, b, c] = corners.map(|corner| placement.to_local(corner));
+        let Some(normal) = triangle_normal(&a, &b, &c) else { return };
+        // A vertex is wanted where each of these planes has it on its inner side, within rounding.
+        let slack = 1e-4 * ((b - a).norm() + (c - b).norm() + (a - c).norm());
+        let inner = |p: &V3, q: &V3| {
+            let across = normal.cross(&(q - p)).normalize();
+            (across, across.dot(p) - slack)
+        };
+        let planes = [inner(&a, &b), inner(&b, &c), inner(&c, &a), (-normal, -normal.dot(&a) - reach - slack)];
+        let is_wanted = |lower: &[f32; 4], upper: &[f32; 4]| {
+            planes
+                .iter()
+                .all(|(d, least)| (0..3).map(|k| (lower[k] * d[k]).max(upper[k] * d[k])).sum::<f32>() >= *least)
+        };
+        tree.visit(is_wanted, |vertex| tell(vertex as usize));
     }
 
     /// Smallest signed distance inside the segment `p q`, where it lies strictly between the ends: parameter, distance and
     /// the normal that is orthogonal to the segment. The distance is a maximum of linear functions along the segment.
     pub(crate) fn distance_to_segment(&self, p: &V3, q: &V3) -> Option<(f32, f32, V3)> {
         let line = |t: f32| {
-            let (_, normal) = self.distance(&(p + (q - p) * t));
-            let offset = self.planes.iter().find(|f| f.0 == normal).map_or(0.0, |f| f.1);
+            let (_, plane) = self.nearest_plane(&(p + (q - p) * t));
+            let (normal, offset) = self.planes.get(plane).copied().unwrap_or((V3::z(), 0.0));
             (normal.dot(p) - offset, normal.dot(&(q - p)), normal)
         };
         let (mut falling, mut rising) = (line(0.0), line(1.0));
@@ -218,7 +321,7 @@ mod tests {
         let cuboid = ConvexPolytope::cuboid([0.008, 0.012, 0.02]).unwrap();
         let ball = ConvexPolytope::hull(sphere(1000, 0.01)).unwrap();
         for (name, polytope) in [("cuboid", cuboid), ("ball", ball)] {
-            let table = Polytope::new(&polytope);
+            let table = Polytope::new(&polytope, 0);
             assert_eq!(table.planes.len(), polytope.planes().len(), "{name}");
             let worst = [0.0, 0.003, 0.01, 0.012, 0.03].iter().flat_map(|r| sphere(200, *r)).map(|p| {
                 let (distance, _) = table.distance(&p.coords.cast());
@@ -231,6 +334,43 @@ mod tests {
     }
 
     #[test]
+    fn a_tree_of_planes_and_vertices_gives_what_asking_all_of_them_gives() {
+        let hull = ConvexPolytope::hull(sphere(2562, 0.01)).unwrap();
+        let tree = Polytope::new(&hull, 0);
+        assert!(tree.plane_tree.is_some() && tree.vertex_tree.is_some());
+        let all = Polytope { plane_tree: None, vertex_tree: None, ..tree.clone() };
+        let turn = nalgebra::Rotation3::from_euler_angles(0.3, -0.7, 1.1).into_inner();
+        let placement = Placement { rotation: turn, origin: V3::new(0.1, -0.2, 0.05) };
+        let points = [0.0, 0.002, 0.0099, 0.01, 0.0101, 0.02, 0.3].iter().flat_map(|r| sphere(300, *r));
+        let points: Vec<V3> = points.map(|p| p.coords.cast()).collect();
+        for p in &points {
+            assert_eq!(tree.nearest_plane(p), all.nearest_plane(p), "{p}");
+        }
+        for pair in points.windows(2) {
+            assert_eq!(tree.distance_to_segment(&pair[0], &pair[1]), all.distance_to_segment(&pair[0], &pair[1]));
+        }
+        let bounds = |part: &Polytope| Solid::Polytopes(vec![part.clone()]).bounds(&placement);
+        assert_eq!(bounds(&tree), bounds(&all));
+        // No vertex in the prism below a triangle is left out.
+        for corners in points.chunks_exact(3) {
+            let corners = [corners[0], corners[1], corners[2]].map(|p| placement.to_world(p));
+            let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+            let is_below = |v: &NumberedVertex| {
+                let inside = (0..3)
+                    .all(|k| normal.cross(&(corners[(k + 1) % 3] - corners[k])).dot(&(v.position - corners[k])) >= 0.0);
+                inside && normal.normalize().dot(&(v.position - corners[0])) < 1e-3
+            };
+            let found = |part: &Polytope| {
+                let mut numbers = Vec::new();
+                part.vertices_below(&placement, &corners, 1e-3, |v| numbers.extend(is_below(&v).then_some(v.number)));
+                numbers.sort_unstable();
+                numbers
+            };
+            assert_eq!(found(&tree), found(&all));
+        }
+    }
+
+    #[test]
     fn a_facet_is_not_merged_with_an_inclined_neighbour() {
         // 6-sided pyramid, its sides 1 degree steep.
         let rim = (0..6).map(|k| {
@@ -238,7 +378,7 @@ mod tests {
             Point3::new(0.01 * cos, 0.01 * sin, 0.0)
         });
         let tips = [Point3::new(0.0, 0.0, 0.01 * 1.0_f64.to_radians().tan()), Point3::new(0.0, 0.0, -0.01)];
-        let solid = Solid::Polytopes(vec![Polytope::new(&ConvexPolytope::hull(rim.chain(tips).collect()).unwrap())]);
+        let solid = Solid::Polytopes(vec![Polytope::new(&ConvexPolytope::hull(rim.chain(tips).collect()).unwrap(), 0)]);
         let above_rim = V3::new(-0.008, 0.0, 1e-3);
         let (distance, _) = solid.distance(&above_rim);
         let height = 1e-3 - 0.01 * 1.0_f32.to_radians().tan() * (1.0 - 0.008 / 0.01);

@@ -2,7 +2,8 @@
 //!
 //! During contact, a tool's window follows the contact point. After release the window is held, and its detail scales
 //! with the deformation, until the skin under it has recovered. On a new contact elsewhere before that, the old window
-//! hands over to the new one within [`HAND_OVER_S`]. Overlapping windows share the skin by a partition of unity.
+//! hands over to the new one within [`HAND_OVER_S`]. Overlapping windows share the skin by a partition of unity. Confidence
+//! moves as steadily as the detail that it speaks for.
 
 use std::sync::Arc;
 
@@ -57,6 +58,28 @@ struct Released {
 struct ToolWindows {
     current: Option<Window>,
     leaving: Option<Window>,
+    confidence: Steady,
+}
+
+/// A confidence that moves as fast as windows take over, and no faster.
+#[derive(Debug, Clone, Copy, Default)]
+struct Steady {
+    value: f32,
+    /// Tick to which it has moved.
+    tick: u64,
+}
+
+impl Steady {
+    /// Moves towards `aim` by at most `step` a tick; an unknown aim is waited for.
+    fn approach(&mut self, aim: Option<f32>, tick: u64, step: f32) {
+        let Some(aim) = aim else {
+            self.tick = tick.saturating_sub(1);
+            return;
+        };
+        let most = step * tick.saturating_sub(self.tick) as f32;
+        self.value += (aim - self.value).clamp(-most, most);
+        self.tick = tick;
+    }
 }
 
 /// Enrichment of a running simulation: windows, tables and scratch. Allocates on construction only.
@@ -65,6 +88,7 @@ pub struct LiveEnrichment {
     enricher: Arc<Enricher>,
     scratch: EnricherScratch,
     tools: Vec<ToolWindows>,
+    least_confidence: Steady,
     offsets: Vec<Node>,
     detail: Vec<Node>,
     /// Sum of the windows' shares at each vertex.
@@ -79,6 +103,7 @@ impl LiveEnrichment {
         Self {
             scratch: enricher.scratch(),
             tools: vec![ToolWindows::default(); model.n_tools()],
+            least_confidence: Steady::default(),
             offsets: vec![[0.0; 4]; n_skin],
             detail: vec![[0.0; 4]; n_skin],
             shares: vec![0.0; n_skin],
@@ -95,22 +120,38 @@ impl LiveEnrichment {
     /// Copies the windows of another enrichment of the same model, for a change of examples during contact.
     pub fn adopt(&mut self, other: &Self) {
         self.tools.copy_from_slice(&other.tools);
+        self.least_confidence = other.least_confidence;
     }
 
     /// Forgets all contacts: the state was reset or restored.
     pub fn forget(&mut self) {
         self.tools.fill(ToolWindows::default());
+        self.least_confidence = Steady::default();
     }
 
-    /// Confidence in the detail of each tool, `[n_tools]`, when a frame was last written; 0 without contact.
+    /// Confidence in the detail of each tool, `[n_tools]`; 0 without contact. It follows the frame last written as fast as detail
+    /// comes and goes: from 0 to 1 takes [`HAND_OVER_S`].
     pub fn confidence(&self, tool: usize) -> f32 {
-        self.tools[tool].confidence()
+        self.tools[tool].confidence.value
     }
 
-    /// Least confidence over the tools with a window when a frame was last written; 0 is the plain coarse skin.
+    /// Least confidence over the tools with a window, as steady as [`Self::confidence`]; 0 is the plain coarse skin.
     pub fn least_confidence(&self) -> f32 {
-        let with_window = self.tools.iter().filter(|t| t.current.is_some()).map(ToolWindows::confidence);
-        with_window.reduce(f32::min).unwrap_or(0.0)
+        self.least_confidence.value
+    }
+
+    /// Moves the confidences on to this tick.
+    fn steady_confidence(&mut self, tick: u64, step: f32) {
+        let mut least = Some(f32::INFINITY);
+        for windows in &mut self.tools {
+            let aim = windows.confidence_aim();
+            windows.confidence.approach(aim, tick, step);
+            if windows.current.is_some() {
+                least = least.zip(aim).map(|(a, b)| a.min(b));
+            }
+        }
+        let least = least.map(|c| if c.is_finite() { c } else { 0.0 });
+        self.least_confidence.approach(least, tick, step);
     }
 
     /// Follows the contacts of a tick. To be called after every tick; cheap.
@@ -133,6 +174,7 @@ impl LiveEnrichment {
                 windows.hold(&self.enricher, offset, model.timestep_s() as f32);
             }
         }
+        self.steady_confidence(state.tick(), step);
     }
 
     fn n_windows(&self) -> usize {
@@ -146,11 +188,13 @@ impl LiveEnrichment {
             state.write_skin(model, out);
             return;
         }
+        let step = model.timestep_s() as f32 / HAND_OVER_S;
         let reach = if n_windows == 1 && self.enricher.is_sampled() {
             self.write_one(model, state, out)
         } else {
             self.write_all(model, state, out)
         };
+        self.steady_confidence(state.tick(), step);
         for (reading, solid) in state.tools().iter().zip(&model.solids).filter(|(r, _)| r.present && reach > 0.0) {
             keep_clear(solid, &placement(&reading.proxy), &state.skin, reach, out);
         }
@@ -195,7 +239,7 @@ impl LiveEnrichment {
     /// `d = min(1, sum_a g_a) sum_a g_a h_a d_a / sum_a g_a h_a` with gains `g` and closeness `h`: windows come and go without a
     /// jump.
     fn lay_all(&mut self, model: &Model, state: &State) {
-        let Self { enricher, scratch, tools, offsets, detail, shares, total } = self;
+        let Self { enricher, scratch, tools, offsets, detail, shares, total, .. } = self;
         total.fill([0.0; 4]);
         shares.fill(0.0);
         let mut gains = 0.0;
@@ -244,8 +288,9 @@ impl ToolWindows {
         self.current.iter_mut().chain(&mut self.leaving)
     }
 
-    fn confidence(&self) -> f32 {
-        self.current.and_then(|w| w.laid).map_or(0.0, |(trust, _)| trust.confidence)
+    /// Where the confidence goes; `None` while no frame has been written with the window.
+    fn confidence_aim(&self) -> Option<f32> {
+        self.current.map_or(Some(0.0), |window| window.laid.map(|(trust, _)| trust.confidence))
     }
 
     /// Moves the window or begins a new one. `is_alone`: no tool has a window, so that a new one needs no hand-over.
@@ -275,7 +320,7 @@ impl ToolWindows {
         released.before = now;
         released.recovered_s = if is_back { released.recovered_s + dt } else { 0.0 };
         if released.recovered_s >= RECOVERED_S {
-            *self = Self { current: None, leaving: self.current };
+            (self.current, self.leaving) = (None, self.current);
         }
     }
 }

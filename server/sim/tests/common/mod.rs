@@ -73,6 +73,7 @@ impl Scene {
             sleep: SleepOptions { enabled: false, ..SleepOptions::default() },
             tools: Vec::new(),
             planes: Vec::new(),
+            bounds_m: None,
         };
         Self { description }
     }

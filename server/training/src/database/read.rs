@@ -2,12 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
-use safetensors::tensor::{Dtype, SafeTensors};
+use safetensors::tensor::{Dtype, Metadata as Header, SafeTensors};
 use serde_json::Value;
 
+use super::plausible::SceneLimits;
 use super::tensors::{NO_CHECKSUM, checksum};
-use super::{Database, DatabaseError, FORMAT, FORMAT_VERSION, METADATA_KEY, Metadata, versions};
+use super::{Database, DatabaseError, FORMAT, FORMAT_VERSION, MAX_DATABASE_BYTES, METADATA_KEY, Metadata, versions};
 use crate::example::Example;
+use crate::regular_file::RegularFile;
+
+/// Largest header: names and shapes of the tensors, and a record of each example.
+const MAX_HEADER_BYTES: u64 = 16 << 20;
+/// Bytes of the header's length.
+const LENGTH_BYTES: u64 = 8;
 
 impl Database {
     /// Reads and checks a file; with `scene_hash` it must belong to that scene.
@@ -15,18 +22,54 @@ impl Database {
     /// # Errors
     /// See [`DatabaseError`].
     pub fn read(path: &Path, scene_hash: Option<&str>) -> Result<Self, DatabaseError> {
-        let file = BeingRead { path };
-        let bytes = std::fs::read(path).map_err(|error| DatabaseError::Io { path: path.to_owned(), error })?;
-        let tensors = SafeTensors::deserialize(&bytes).map_err(|e| file.malformed(e.to_string()))?;
-        let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|e| file.malformed(e.to_string()))?;
-        let text = header.metadata().as_ref().and_then(|m| m.get(METADATA_KEY));
-        let text = text.ok_or_else(|| file.foreign(format!("there is no metadata key `{METADATA_KEY}`")))?;
-        let metadata = file.metadata(text, scene_hash)?;
-        file.check_sum(text, &metadata.sha256, &tensors)?;
-        let arrays = Arrays { file: &file, tensors: &tensors, n: metadata.examples.len() };
-        let examples = arrays.examples(&metadata)?;
-        Ok(Self { about: metadata.about, examples, rejected: metadata.rejected })
+        let open = RegularFile::open(path, MAX_DATABASE_BYTES);
+        let open = open.map_err(|fault| DatabaseError::File { path: path.to_owned(), fault })?;
+        read(open, &BeingRead { path }, scene_hash, None)
     }
+
+    /// Reads an open file that errors call `path`, and checks it against a scene: hash and sizes before the examples are
+    /// read, then all numbers.
+    ///
+    /// # Errors
+    /// See [`DatabaseError`].
+    pub fn read_for(open: RegularFile, path: &Path, scene: &SceneLimits) -> Result<Self, DatabaseError> {
+        read(open, &BeingRead { path }, Some(&scene.scene_hash), Some(scene))
+    }
+}
+
+fn read(
+    mut open: RegularFile,
+    file: &BeingRead<'_>,
+    scene_hash: Option<&str>,
+    scene: Option<&SceneLimits>,
+) -> Result<Database, DatabaseError> {
+    let fault = |fault| DatabaseError::File { path: file.path(), fault };
+    let mut bytes = open.read_next(LENGTH_BYTES).map_err(fault)?;
+    let header_bytes = file.header_bytes(&bytes, open.bytes())?;
+    let text = open.read_next(header_bytes).map_err(fault)?;
+    let header: Header = serde_json::from_slice(&text).map_err(|e| file.malformed(e.to_string()))?;
+    if Some(open.bytes()) != (LENGTH_BYTES + header_bytes).checked_add(header.data_len() as u64) {
+        return Err(file.malformed(format!("its header does not describe {} bytes", open.bytes())));
+    }
+    let key = header.metadata().as_ref().and_then(|m| m.get(METADATA_KEY));
+    let key = key.ok_or_else(|| file.foreign(format!("there is no metadata key `{METADATA_KEY}`")))?;
+    let metadata = file.metadata(key, scene_hash)?;
+    if let Some(scene) = scene {
+        let kept = |name: &str| header.info(name).map(|info| info.shape.as_slice());
+        let checked = scene.check_sizes(metadata.examples.len(), header.data_len(), kept);
+        checked.map_err(|problem| file.inconsistent(problem))?;
+    }
+    bytes.extend(text);
+    open.read_rest(&mut bytes).map_err(fault)?;
+    let tensors = SafeTensors::deserialize(&bytes).map_err(|e| file.malformed(e.to_string()))?;
+    file.check_sum(key, &metadata.sha256, &tensors)?;
+    let arrays = Arrays { file, tensors: &tensors, n: metadata.examples.len() };
+    let examples = arrays.examples(&metadata)?;
+    if let Some(scene) = scene {
+        let checked = examples.iter().try_for_each(|example| scene.check_numbers(example));
+        checked.map_err(|problem| file.inconsistent(problem))?;
+    }
+    Ok(Database { about: metadata.about, examples, rejected: metadata.rejected })
 }
 
 /// The file that errors name.
@@ -37,6 +80,19 @@ struct BeingRead<'a> {
 impl BeingRead<'_> {
     fn path(&self) -> PathBuf {
         self.path.to_owned()
+    }
+
+    /// Length of the header, from the first bytes of a file of `file_bytes`.
+    fn header_bytes(&self, first: &[u8], file_bytes: u64) -> Result<u64, DatabaseError> {
+        let length = first.try_into().map(u64::from_le_bytes);
+        let length = length.map_err(|_| self.malformed(format!("it has {file_bytes} bytes")))?;
+        if length > file_bytes - LENGTH_BYTES {
+            return Err(self.malformed(format!("its header should have {length} bytes, the file has {file_bytes}")));
+        }
+        if length > MAX_HEADER_BYTES {
+            return Err(self.malformed(format!("its header has {length} bytes; at most {MAX_HEADER_BYTES} are read")));
+        }
+        Ok(length)
     }
 
     fn malformed(&self, problem: String) -> DatabaseError {

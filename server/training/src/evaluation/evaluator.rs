@@ -24,10 +24,10 @@ const NEAR_RADII: f64 = 3.0;
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluationError {
     /// The coarse model cannot be built.
-    #[error("coarse model: {0}")]
+    #[error("coarse model")]
     Model(#[from] ModelError),
     /// A method cannot be prepared.
-    #[error("method `{method}`: {source}")]
+    #[error("method `{method}`")]
     Method {
         /// Its name.
         method: String,

@@ -103,6 +103,7 @@ pub fn setup(shape: Shape) -> Setup {
             sleep: SleepOptions::default(),
             tools: vec![tool(ToolShape::Capsule { radius_m: shape.radius_m, length_m: 0.1 })],
             planes: Vec::new(),
+            bounds_m: None,
         },
     }
 }

@@ -233,7 +233,7 @@ pub(crate) struct Replay {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Rpc {
-    /// reset, pause, resume, step, snapshot, restore, activate (with {"database": "JOB or PATH"}), or a method of jobs: job_list, job_get, ...
+    /// reset, pause, resume, step, snapshot, restore, activate (with {"database": "JOB or FILE"}), or a method of jobs: job_list, job_get, ...
     pub(crate) method: String,
     /// Arguments as JSON.
     #[arg(default_value = "{}")]

@@ -32,7 +32,12 @@ impl Output {
         let mut object = json!({"message": format!("{error:#}")});
         if let Some(ClientError::Refused(reply)) = error.downcast_ref() {
             object["code"] = reply.code.as_str().into();
-            object["retryable"] = reply.retryable.into();
+            // All keys of the reply; the message is the one printed.
+            let reply = serde_json::to_value(reply).unwrap_or_default();
+            object = json!({"message": object["message"]});
+            for (key, value) in reply.as_object().into_iter().flatten().filter(|(key, _)| *key != "message") {
+                object[key] = value.clone();
+            }
         }
         println!("{}", json!({"error": object}));
     }

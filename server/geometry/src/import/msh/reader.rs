@@ -73,6 +73,23 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// Passes over all that may stand before `$MeshFormat`: sections of comments, and lines that begin no section.
+    pub(super) fn skip_comments(&mut self) -> Result<(), Fault> {
+        while !self.bytes[self.at..].trim_ascii().is_empty() {
+            let begin = self.at;
+            let line = self.line()?;
+            match line.strip_prefix('$') {
+                Some("Comments") => self.skip_section("Comments")?,
+                Some(_) => {
+                    self.at = begin;
+                    return Ok(());
+                }
+                None => {}
+            }
+        }
+        Ok(())
+    }
+
     /// Advances to the next line that begins with `$` and returns the rest of it; `None` at the end of the file.
     pub(super) fn next_section(&mut self) -> Result<Option<&'a str>, Fault> {
         while !self.bytes[self.at..].trim_ascii().is_empty() {
@@ -80,7 +97,7 @@ impl<'a> Reader<'a> {
             if let Some(name) = line.strip_prefix('$') {
                 return Ok(Some(name));
             }
-            if !line.is_empty() {
+            if !line.is_empty() && !["#", "//", "%"].iter().any(|mark| line.starts_with(mark)) {
                 return fault(self.place(), format!("`{}` where a $Section is expected", shown(line)), DAMAGED);
             }
         }

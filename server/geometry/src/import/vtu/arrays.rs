@@ -83,6 +83,14 @@ impl<'a> Source<'a> {
         Ok(values)
     }
 
+    /// `n` positions; some writers leave out that a position has three components.
+    pub(super) fn positions(&self, array: &Array<'_, '_>, n: usize) -> Result<Vec<f64>, Fault> {
+        if array.node.attribute("NumberOfComponents").is_none() {
+            return self.numbers(array, 3 * n, 1);
+        }
+        self.numbers(array, n, 3)
+    }
+
     /// Non-negative integers, `n` of them if known.
     pub(super) fn indices(&self, array: &Array<'_, '_>, n: Option<usize>) -> Result<Vec<u64>, Fault> {
         let values = match self.stream(array)? {

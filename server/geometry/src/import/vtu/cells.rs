@@ -5,13 +5,15 @@ use roxmltree::Node;
 use super::arrays::{Array, Source, place};
 use super::child;
 use crate::import::assemble::{Cell, Shape};
-use crate::import::error::{DAMAGED, Fault, Place, fault};
+use crate::import::error::{DAMAGED, Fault, fault};
 
 /// Import of a VTK cell type.
 enum Kind {
     Taken(Shape),
     /// A hexahedron whose corners run in x, then y, then z.
     Voxel,
+    /// A quad whose corners run in x, then y.
+    Pixel,
     Other(&'static str),
     HighOrder(&'static str),
 }
@@ -19,20 +21,28 @@ enum Kind {
 /// Corners of `VTK_VOXEL` in the order of `VTK_HEXAHEDRON`.
 const VOXEL_CORNERS: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
 
-fn kind(code: u64) -> Kind {
-    match code {
-        1 => Kind::Taken(Shape::Point),
-        3 | 21 | 35 => Kind::Taken(Shape::Line),
-        5 | 22 => Kind::Taken(Shape::Triangle),
-        9 | 23 | 28 => Kind::Taken(Shape::Quad),
-        12 => Kind::Taken(Shape::Hexahedron),
-        11 => Kind::Voxel,
-        10 => Kind::Other("tetrahedra"),
-        13 => Kind::Other("wedges (prisms)"),
-        14 => Kind::Other("pyramids"),
-        42 => Kind::Other("polyhedra"),
-        25 | 29 | 33 | 72 | 79 => Kind::HighOrder("hexahedra of second or higher order"),
-        24 | 71 | 78 => Kind::HighOrder("tetrahedra of second or higher order"),
+/// Corners of `VTK_PIXEL` in the order of `VTK_QUAD`.
+const PIXEL_CORNERS: [usize; 8] = [0, 1, 3, 2, 4, 5, 6, 7];
+
+/// Cells of Lagrange (68 to 74) and Bezier (75 to 81) kind and the older ones of any order (60 to 67) have their corners first,
+/// in the order of the plain cell; with no more points than corners they are that cell.
+fn kind(code: u64, n_points: usize) -> Kind {
+    match (code, n_points) {
+        (1, _) => Kind::Taken(Shape::Point),
+        (3 | 21 | 35 | 60 | 68 | 75, _) | (4, 2) => Kind::Taken(Shape::Line),
+        (5 | 22 | 34 | 61 | 69 | 76, _) | (6 | 7, 3) => Kind::Taken(Shape::Triangle),
+        (9 | 23 | 28 | 62 | 70 | 77, _) | (7, 4) => Kind::Taken(Shape::Quad),
+        (12, _) | (67 | 72 | 79, 8) => Kind::Taken(Shape::Hexahedron),
+        (8, _) => Kind::Pixel,
+        (11, _) => Kind::Voxel,
+        (10, _) | (64 | 71 | 78, 4) => Kind::Other("tetrahedra"),
+        (13, _) | (65 | 73 | 80, 6) => Kind::Other("wedges (prisms)"),
+        (14, _) | (66 | 74 | 81, 5) => Kind::Other("pyramids"),
+        (42, _) => Kind::Other("polyhedra"),
+        (25 | 29 | 33 | 67 | 72 | 79, _) => Kind::HighOrder("hexahedra of second or higher order"),
+        (24 | 64 | 71 | 78, _) => Kind::HighOrder("tetrahedra of second or higher order"),
+        (26 | 31 | 32 | 65 | 73 | 80, _) => Kind::HighOrder("wedges (prisms) of second or higher order"),
+        (27 | 37 | 66 | 74 | 81, _) => Kind::HighOrder("pyramids of second or higher order"),
         _ => Kind::Other("cells that are neither points, lines, triangles, quads nor hexahedra"),
     }
 }
@@ -52,29 +62,53 @@ pub(super) fn read(
     };
     let (offsets, types) = (whole("offsets", Some(n_cells))?, whole("types", Some(n_cells))?);
     let connectivity = whole("connectivity", None)?;
-    let mut cells = Vec::with_capacity(n_cells);
+    let mut ranges = Vec::with_capacity(n_cells);
     let mut begin = 0;
-    for (i, (&end, &code)) in offsets.iter().zip(&types).enumerate() {
+    for (i, &end) in offsets.iter().enumerate() {
         let range = usize::try_from(begin).ok().zip(usize::try_from(end).ok());
         let Some(points) = range.and_then(|(begin, end)| connectivity.get(begin..end)) else {
             let problem = format!("cell {i} runs from {begin} to {end} of {} entries", connectivity.len());
             return fault(place(node, "offsets"), problem, DAMAGED);
         };
-        cells.push(cell(node, i, code, points, n_points)?);
+        ranges.push(points);
         begin = end;
     }
-    Ok(cells)
+    refuse_unfit(node, &types, &ranges)?;
+    let cells = types.iter().zip(&ranges).enumerate();
+    cells.map(|(i, (&code, points))| cell(node, i, code, points, n_points)).collect()
+}
+
+/// A mesh with other volumes than 8-node hexahedra would have holes where they are.
+fn refuse_unfit(node: Node<'_, '_>, types: &[u64], ranges: &[&[u64]]) -> Result<(), Fault> {
+    let kinds = || types.iter().zip(ranges).map(|(&code, points)| kind(code, points.len()));
+    let Some(i) = kinds().position(|kind| matches!(kind, Kind::Other(_) | Kind::HighOrder(_))) else { return Ok(()) };
+    let (code, n_points) = (types[i], ranges[i].len());
+    let n_same = types.iter().zip(ranges).filter(|(other, points)| **other == code && points.len() == n_points).count();
+    let n_hexahedra = kinds().filter(|kind| matches!(kind, Kind::Taken(Shape::Hexahedron) | Kind::Voxel)).count();
+    let beside = if n_hexahedra > 0 { format!(" beside {n_hexahedra} hexahedra") } else { String::new() };
+    let (name, advice) = match kind(code, n_points) {
+        Kind::HighOrder(name) => (name, "save the mesh with cells of first order"),
+        Kind::Other(name) if n_hexahedra > 0 => (
+            name,
+            "mesh the whole body with hexahedra (in Gmsh: Recombine, or Mesh.SubdivisionAlgorithm = 2, which splits all cells              alike): without these cells the body would have holes",
+        ),
+        Kind::Other(name) => {
+            (name, "mesh the body with hexahedra (in Gmsh: Recombine, or Mesh.SubdivisionAlgorithm = 2)")
+        }
+        _ => ("cells", DAMAGED),
+    };
+    let problem = format!("holds {n_same} {name}{beside} (cell {i}, type {code}); 8-node hexahedra are read");
+    fault(place(node, "types"), problem, advice)
 }
 
 fn cell(node: Node<'_, '_>, i: usize, code: u64, points: &[u64], n_points: usize) -> Result<Cell, Fault> {
-    let (shape, order) = match kind(code) {
+    let (shape, order) = match kind(code, points.len()) {
         Kind::Taken(shape) => (shape, [0, 1, 2, 3, 4, 5, 6, 7]),
+        Kind::Pixel => (Shape::Quad, PIXEL_CORNERS),
         Kind::Voxel => (Shape::Hexahedron, VOXEL_CORNERS),
-        Kind::Other(name) => {
-            let advice = "mesh with hexahedra only, or extract them (ParaView: Extract Cells By Type)";
-            return refuse(node, i, name, code, advice);
+        Kind::Other(name) | Kind::HighOrder(name) => {
+            return fault(place(node, "types"), format!("cell {i} belongs to {name} (type {code})"), DAMAGED);
         }
-        Kind::HighOrder(name) => return refuse(node, i, name, code, "save the mesh with cells of first order"),
     };
     if points.len() < shape.n_corners() {
         let problem = format!("cell {i} of type {code} has {} points", points.len());
@@ -90,10 +124,4 @@ fn cell(node: Node<'_, '_>, i: usize, code: u64, points: &[u64], n_points: usize
         corners[k] = point as u32;
     }
     Ok(Cell { shape, corners, number: i as u64 })
-}
-
-fn refuse<T>(node: Node<'_, '_>, i: usize, name: &str, code: u64, advice: &str) -> Result<T, Fault> {
-    let Place::Field(field, line) = place(node, "types") else { return fault(Place::File, name, advice) };
-    let problem = format!("holds {name} (cell {i}, type {code}); 8-node hexahedra are read");
-    fault(Place::Field(field, line), problem, advice)
 }

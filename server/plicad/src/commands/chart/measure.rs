@@ -11,7 +11,7 @@ use toml::Value;
 
 use super::configuration::{Change, Configuration, What};
 use super::points::Point;
-use crate::commands::bench::bench;
+use crate::commands::bench::{WHOLE_MOTION, bench};
 
 /// Called with the name of each step of a measurement.
 pub(super) type StepObserver<'a> = &'a mut (dyn FnMut(&str) + Send);
@@ -104,7 +104,7 @@ fn tick_us(config: &Config, ticks: u64) -> anyhow::Result<f64> {
             config.file().display()
         )
     })?;
-    Ok(bench(config, motion, ticks)?.tick_us.p50)
+    Ok(bench(config, motion, ticks, WHOLE_MOTION)?.tick_us.p50)
 }
 
 /// The scene with `changes` in the tables of its object.

@@ -36,7 +36,8 @@ fn activate(client: &Client, id: &str, output: Output) -> anyhow::Result<ExitCod
     let reply = client.activate(id)?;
     let (examples, generation) = (reply.examples, reply.database_generation);
     let text = format!(
-        "{examples} examples of job {id} enrich the skin from tick {} on, as generation {generation}",
+        "{examples} examples of {} enrich the skin from tick {} on, as generation {generation}",
+        if id.bytes().all(|b| b.is_ascii_digit()) { format!("job {id}") } else { format!("file {id}") },
         reply.tick
     );
     output.result(&json!(reply), &text);

@@ -21,6 +21,9 @@ fn table(reply: &JobListReply) -> String {
     let mut lines = vec![line(["job", "state", "kind", "scene", "examples"], "")];
     lines.extend(reply.jobs.iter().map(describe));
     lines.extend((reply.older > 0).then(|| format!("and {} older ones", reply.older)));
+    lines.extend(
+        (reply.removed > 0).then(|| format!("finished and removed since the daemon's start: {}", reply.removed)),
+    );
     lines.join("\n")
 }
 
