@@ -221,7 +221,7 @@ impl Flicker {
 fn confidence_moves_as_steadily_as_detail_does() {
     let away = Point3::new(0.05, 0.03, 0.3);
     let still = deep(0.05, 0.03, 0.004);
-    // Presses, slides out of what was taught, and is taken away; then trembles on the skin, jumps elsewhere, and is taken away
+    // Presses, slides out of what was trained on, and is taken away; then trembles on the skin, jumps elsewhere, and is taken away
     // while another tool comes, goes, and comes again.
     let first = |k: i32| match k {
         0..200 => deep(0.05, 0.03, 0.004 * f64::from(k) / 200.0),
