@@ -11,6 +11,7 @@ mod folder;
 mod keep;
 mod priority;
 mod process;
+mod prune;
 mod reason;
 mod recover;
 mod scene;
@@ -102,7 +103,7 @@ impl Jobs {
         let shared = self.shared()?;
         let _alone = shared.submitting.lock().unwrap_or_else(PoisonError::into_inner);
         // Here too, since jobs may come faster than the other thread removes them.
-        keep::prune(&shared.store, shared.keep);
+        prune::prune(&shared.store, shared.keep);
         let reply = submit::submit(&shared.store, request, &shared.served, shared.keep)?;
         shared.supervisor.unpark();
         Ok(reply)

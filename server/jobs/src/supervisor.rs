@@ -14,8 +14,9 @@ use plica_protocol::jobs::{JobFile, JobState};
 use plica_training::now_unix_s;
 
 use crate::folder::{JobFolder, StoredStatus};
-use crate::keep::{Keep, prune};
+use crate::keep::Keep;
 use crate::process::{Launch, Process};
+use crate::prune::prune;
 use crate::reason::reason;
 use crate::store::Store;
 

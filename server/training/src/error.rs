@@ -7,7 +7,7 @@ use plica_accurate::{SolidError, SolveError};
 use plica_geometry::{EmbeddingError, HullError};
 use plica_sim::ModelError;
 
-use crate::database::DatabaseError;
+use crate::database_error::DatabaseError;
 
 /// Why there are no interactions.
 #[derive(Debug, thiserror::Error)]

@@ -8,7 +8,8 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::atomic_file::write_json_atomically;
-use crate::database::{About, Database, DatabaseError, DatabaseKind};
+use crate::database::{About, Database, DatabaseKind};
+use crate::database_error::DatabaseError;
 use crate::error::TrainingError;
 use crate::example::{Example, Outcome, Rejection};
 use crate::job_folder::{JobPaths, MAX_RECORD_BYTES, Writer};

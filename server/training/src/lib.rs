@@ -10,6 +10,7 @@ mod atomic_file;
 mod canonical;
 mod coarse;
 mod database;
+mod database_error;
 mod error;
 pub mod evaluation;
 mod example;
@@ -37,9 +38,10 @@ pub use atomic_file::{sync_folder, write_atomically, write_json_atomically};
 pub use canonical::{fingerprint, hexadecimal, to_text};
 pub use coarse::{Coarse, CoarseResult, Interrupted, Settling, SolveObserver};
 pub use database::{
-    About, CONTACT_POINT, Database, DatabaseError, DatabaseKind, FORMAT, FORMAT_VERSION, MAX_DATABASE_BYTES,
-    METADATA_KEY, SOLVER_VERSION, SceneLimits, TANDEM_VERSION, versions,
+    About, CONTACT_POINT, Database, DatabaseKind, FORMAT, FORMAT_VERSION, MAX_DATABASE_BYTES, METADATA_KEY,
+    SOLVER_VERSION, SceneLimits, TANDEM_VERSION, versions,
 };
+pub use database_error::DatabaseError;
 pub use error::{BuildError, INTERRUPTED, PlanError, TrainingError};
 pub use example::{Example, Outcome, Reason, Record, Rejection, SettlingRecord};
 pub use folder::{TrainingFolder, TrainingJob, TrainingProgress, TrainingStage};

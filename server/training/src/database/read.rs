@@ -7,7 +7,8 @@ use serde_json::Value;
 
 use super::plausible::SceneLimits;
 use super::tensors::{NO_CHECKSUM, checksum};
-use super::{Database, DatabaseError, FORMAT, FORMAT_VERSION, MAX_DATABASE_BYTES, METADATA_KEY, Metadata, versions};
+use super::{Database, FORMAT, FORMAT_VERSION, MAX_DATABASE_BYTES, METADATA_KEY, Metadata, versions};
+use crate::database_error::DatabaseError;
 use crate::example::Example;
 use crate::regular_file::RegularFile;
 

@@ -6,9 +6,10 @@ use std::path::Path;
 use safetensors::tensor::{Metadata as Header, TensorInfo};
 
 use super::tensors::{NO_CHECKSUM, Tensors, checksum, f32s, f64s};
-use super::{Database, DatabaseError, FORMAT, FORMAT_VERSION, METADATA_KEY, Metadata};
+use super::{Database, FORMAT, FORMAT_VERSION, METADATA_KEY, Metadata};
 use crate::atomic_file::write_atomically;
 use crate::canonical;
+use crate::database_error::DatabaseError;
 use crate::example::Example;
 
 impl Database {
