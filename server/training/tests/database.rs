@@ -222,6 +222,9 @@ fn limits() -> SceneLimits {
     SceneLimits { scene_hash: HASH.to_owned(), n_nodes: 5, n_skin: 7, lowest_m: [0.0; 3], highest_m: [3.0, 3.0, 3.0] }
 }
 
+/// A change of an example.
+type Change<'a> = &'a dyn Fn(&mut Example);
+
 fn read_for(path: &Path, limits: &SceneLimits) -> Result<Database, DatabaseError> {
     Database::read_for(RegularFile::open(path, MAX_DATABASE_BYTES).unwrap(), path, limits)
 }
@@ -243,7 +246,7 @@ fn numbers_that_the_object_cannot_have_are_refused_with_example_and_value() {
     let turned = |angle: f64| [[angle.cos(), angle.sin(), 0.0], [-angle.sin(), angle.cos(), 0.0], [0.0, 0.0, 1.0]];
     assert_eq!(refused(&|e| e.contact_frame = turned(0.3)), "");
     assert_eq!(refused(&|e| e.detail[3] = [5.1, 0.0, 0.0]), "", "shorter than the diagonal of 5.196 m");
-    let absurd: [(&str, &dyn Fn(&mut Example)); 11] = [
+    let absurd: [(&str, Change<'_>); 11] = [
         ("d[3] is 5.300e0 m long", &|e| e.detail[3] = [5.3, 0.0, 0.0]),
         ("d[0] is 1.732e30 m long", &|e| e.detail[0] = [1e30; 3]),
         ("d[6] is ", &|e| e.detail[6] = [3e38; 3]),
