@@ -1,5 +1,8 @@
 //! Bounds of the finished jobs that are kept.
 
+/// Beginning of the name of a folder that is being removed; a daemon that finds one at its start goes on.
+pub(crate) const REMOVING: &str = ".removing-";
+
 /// Bounds of the jobs in a data folder. Beyond them finished jobs are removed: cancelled and failed ones first, then those
 /// that are done, each time the oldest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

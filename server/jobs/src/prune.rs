@@ -1,14 +1,11 @@
-//! Removal of finished jobs beyond the bounds.
+//! Removes finished jobs beyond the bounds.
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-use crate::keep::Keep;
+use crate::keep::{Keep, REMOVING};
 use crate::store::Store;
-
-/// Beginning of the name of a folder that is being removed; a daemon that finds one at its start goes on.
-pub(crate) const REMOVING: &str = ".removing-";
 
 /// Removes finished jobs beyond the bounds. Jobs that wait or run, whose process has not ended, or whose examples are in use
 /// stay, and so does the newest, so that no id is given twice.

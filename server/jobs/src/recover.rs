@@ -8,7 +8,7 @@ use plica_protocol::jobs::JobState;
 use plica_training::Writer;
 
 use crate::folder::{JobFolder, StoredStatus};
-use crate::prune::REMOVING;
+use crate::keep::REMOVING;
 use crate::store::{Entry, Found, Store};
 
 /// Folder of an incomplete submission; one that a daemon finds at its start was never acknowledged.

@@ -1,4 +1,4 @@
-//! Errors of example databases.
+//! Why a file is no database of examples.
 
 use std::path::PathBuf;
 

@@ -222,6 +222,9 @@ fn limits() -> SceneLimits {
     SceneLimits { scene_hash: HASH.to_owned(), n_nodes: 5, n_skin: 7, lowest_m: [0.0; 3], highest_m: [3.0, 3.0, 3.0] }
 }
 
+/// A change of an example.
+type Change<'a> = &'a dyn Fn(&mut Example);
+
 fn read_for(path: &Path, limits: &SceneLimits) -> Result<Database, DatabaseError> {
     Database::read_for(RegularFile::open(path, MAX_DATABASE_BYTES).unwrap(), path, limits)
 }
@@ -243,22 +246,21 @@ fn numbers_that_the_object_cannot_have_are_refused_with_example_and_value() {
     let turned = |angle: f64| [[angle.cos(), angle.sin(), 0.0], [-angle.sin(), angle.cos(), 0.0], [0.0, 0.0, 1.0]];
     assert_eq!(refused(&|e| e.contact_frame = turned(0.3)), "");
     assert_eq!(refused(&|e| e.detail[3] = [5.1, 0.0, 0.0]), "", "shorter than the diagonal of 5.196 m");
-    type Change = fn(&mut Example);
-    let absurd: [(&str, Change); 11] = [
-        ("d[3] is 5.300e0 m long", |e| e.detail[3] = [5.3, 0.0, 0.0]),
-        ("d[0] is 1.732e30 m long", |e| e.detail[0] = [1e30; 3]),
-        ("d[6] is ", |e| e.detail[6] = [3e38; 3]),
-        ("u[4] is 6.000e0 m long", |e| e.displacements[4] = [0.0, -6.0, 0.0]),
-        ("d_independent[1] is ", |e| e.independent_detail.as_mut().unwrap()[1] = [9.0; 3]),
-        ("contact_frame [[0.0, 0.0, 0.0]", |e| e.contact_frame = [[0.0; 3]; 3]),
-        ("contact_frame [[1e300", |e| e.contact_frame = [[1e300; 3]; 3]),
-        ("contact_frame", |e| e.contact_frame[2] = [0.0, 0.0, -1.0]),
-        ("contact_point [4.0, 0.0, 0.0] m lies off the object", |e| e.contact_point = [4.0, 0.0, 0.0]),
-        ("tool_pose is at [10000000000.0, ", |e| e.tool_pose[0] = 1e10),
-        ("quaternion of tool_pose has length 2e0", |e| e.tool_pose[6] = 2.0),
+    let absurd: [(&str, Change<'_>); 11] = [
+        ("d[3] is 5.300e0 m long", &|e| e.detail[3] = [5.3, 0.0, 0.0]),
+        ("d[0] is 1.732e30 m long", &|e| e.detail[0] = [1e30; 3]),
+        ("d[6] is ", &|e| e.detail[6] = [3e38; 3]),
+        ("u[4] is 6.000e0 m long", &|e| e.displacements[4] = [0.0, -6.0, 0.0]),
+        ("d_independent[1] is ", &|e| e.independent_detail.as_mut().unwrap()[1] = [9.0; 3]),
+        ("contact_frame [[0.0, 0.0, 0.0]", &|e| e.contact_frame = [[0.0; 3]; 3]),
+        ("contact_frame [[1e300", &|e| e.contact_frame = [[1e300; 3]; 3]),
+        ("contact_frame", &|e| e.contact_frame[2] = [0.0, 0.0, -1.0]),
+        ("contact_point [4.0, 0.0, 0.0] m lies off the object", &|e| e.contact_point = [4.0, 0.0, 0.0]),
+        ("tool_pose is at [10000000000.0, ", &|e| e.tool_pose[0] = 1e10),
+        ("quaternion of tool_pose has length 2e0", &|e| e.tool_pose[6] = 2.0),
     ];
     for (expected, change) in absurd {
-        let message = refused(&change);
+        let message = refused(change);
         assert!(message.contains("example 2: ") && message.contains(expected), "{expected}: {message}");
     }
 }
