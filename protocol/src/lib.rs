@@ -9,6 +9,7 @@
 
 mod bytes;
 pub mod chunk;
+pub mod connection;
 mod error;
 pub mod jobs;
 pub mod keys;

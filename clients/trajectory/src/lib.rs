@@ -16,7 +16,7 @@ mod terrain;
 mod workspace;
 
 pub use error::TrajectoryError;
-pub use fit::{Fit, fit, fit_above, fitted_depth_m};
+pub use fit::{FIT_HELP, Fit, fit, fit_above, fitted_depth_m};
 pub use pose::{CSV_HEADER, TrackedPose};
 pub use read::{Gate, read};
 pub use terrain::Terrain;

@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use plica_daemon::bus::BusOptions;
 use plica_jobs::Priority;
 use plica_protocol::{DEFAULT_ENDPOINT, DEFAULT_SESSION};
+use plica_trajectory::FIT_HELP;
 
 /// Simulates a soft object that tools touch, at 1 kHz, and serves it on a Zenoh bus.
 #[derive(Debug, Parser)]
@@ -79,8 +80,9 @@ impl BusArgs {
 /// `plicad serve`.
 #[derive(Debug, Args)]
 pub struct ServeArgs {
-    /// Scene file [default: the built-in wedge].
-    pub scene: Option<PathBuf>,
+    /// Scene.
+    #[arg(default_value = "wedge", help = SCENE_HELP)]
+    pub scene: PathBuf,
     /// Endpoint and session of the daemon.
     #[command(flatten)]
     pub bus: BusArgs,
@@ -120,6 +122,8 @@ impl From<JobPriority> for Priority {
     }
 }
 
+const SCENE_HELP: &str = "Scene file, or `wedge`, the built-in one";
+const BENCH_SCENE_HELP: &str = "Scene file with a [bench] table, or `wedge`, the built-in one";
 const DATA_HELP: &str =
     "Folder for jobs and their results; one daemon at a time uses it [default: ~/.local/share/plica/SESSION]";
 
@@ -143,7 +147,8 @@ pub struct ChildArgs {
 /// `plicad simulate`.
 #[derive(Debug, Args)]
 pub struct SimulateArgs {
-    /// Scene file, or `wedge` for the built-in one.
+    /// Scene.
+    #[arg(help = SCENE_HELP)]
     pub scene: PathBuf,
     /// Poses: CSV (time_s,tool,px,py,pz,qx,qy,qz,qw) or a TUM trajectory.
     #[arg(long, value_name = "FILE")]
@@ -157,8 +162,8 @@ pub struct SimulateArgs {
     /// Ticks per frame.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub every: u64,
-    /// Maps the trajectory's box into the workspace above the object.
-    #[arg(long)]
+    /// Scales and moves the motion onto the object.
+    #[arg(long, help = FIT_HELP)]
     pub fit: bool,
     /// Tool of poses without a tool name; required if the scene has several tools.
     #[arg(long, value_name = "NAME")]
@@ -168,7 +173,8 @@ pub struct SimulateArgs {
 /// `plicad bench`.
 #[derive(Debug, Args)]
 pub struct BenchArgs {
-    /// Scene file with a \[bench\] table, or `wedge` for the built-in one.
+    /// Scene with a bench table.
+    #[arg(help = BENCH_SCENE_HELP)]
     pub scene: PathBuf,
     /// Ticks to time; the scene's motion is repeated.
     #[arg(long, default_value_t = 3000, value_parser = clap::value_parser!(u64).range(100..=10_000_000))]
@@ -194,8 +200,8 @@ pub enum Element {
 /// `plicad train`.
 #[derive(Debug, Args)]
 pub struct TrainArgs {
-    /// Scene file, or `wedge` for the built-in one.
-    #[arg(required_unless_present = "job")]
+    /// Scene.
+    #[arg(required_unless_present = "job", help = SCENE_HELP)]
     pub scene: Option<PathBuf>,
     /// Runs or continues the job of an existing folder.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["scene", "out", "folder", "kind", "examples", "seed", "sensitivity"])]
@@ -248,8 +254,9 @@ pub struct DatabaseArgs {
 /// `plicad evaluate`.
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
-    /// Scene file [default: the built-in wedge].
-    pub scene: Option<PathBuf>,
+    /// Scene.
+    #[arg(default_value = "wedge", help = SCENE_HELP)]
+    pub scene: PathBuf,
     /// Training and held-out examples.
     #[command(flatten)]
     pub databases: DatabaseArgs,
@@ -267,7 +274,8 @@ pub struct EvaluateArgs {
 /// `plicad chart`.
 #[derive(Debug, Args)]
 pub struct ChartArgs {
-    /// Scene file with a \[bench\] table, or `wedge` for the built-in one.
+    /// Scene with a bench table.
+    #[arg(help = BENCH_SCENE_HELP)]
     pub scene: PathBuf,
     /// Training and held-out examples.
     #[command(flatten)]
@@ -289,7 +297,8 @@ pub struct ChartArgs {
 /// `plicad check`.
 #[derive(Debug, Args)]
 pub struct CheckArgs {
-    /// Scene file, or `wedge` for the built-in one.
+    /// Scene.
+    #[arg(help = SCENE_HELP)]
     pub scene: PathBuf,
 }
 
@@ -312,8 +321,8 @@ pub struct DemoArgs {
     /// Poses to play in place of the scripted motion: CSV or TUM.
     #[arg(long, value_name = "FILE")]
     pub poses: Option<PathBuf>,
-    /// Maps the trajectory's box into the workspace above the object.
-    #[arg(long, requires = "poses")]
+    /// Scales and moves the motion onto the object.
+    #[arg(long, requires = "poses", help = FIT_HELP)]
     pub fit: bool,
     /// Folder for pictures, GLB and the examples of the first run.
     #[arg(long, value_name = "DIR", default_value = "out")]

@@ -35,12 +35,14 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
     }
 }
 
-/// The scene of a path; `wedge`, where no such file exists, is the built-in one.
+/// Whether a path means the built-in scene: `wedge`, where no such file exists.
+fn is_built_in(path: &Path) -> bool {
+    path == Path::new("wedge") && !path.is_file()
+}
+
+/// The scene of a path, or the built-in one.
 fn scene(path: &Path) -> Result<Config, ConfigError> {
-    if path == Path::new("wedge") && !path.exists() {
-        return Config::built_in();
-    }
-    Config::from_file(path)
+    if is_built_in(path) { Config::built_in() } else { Config::from_file(path) }
 }
 
 /// The same, with other examples to start with.
