@@ -77,6 +77,47 @@ fn simulating_twice_gives_the_same_bytes() {
 }
 
 #[test]
+fn the_sample_motion_presses_the_wedge() {
+    let folder = TempDir::new().unwrap();
+    let summary = simulate(Path::new("configs/poses/press.csv"), &folder.path().join("press.safetensors"));
+    assert!(summary["ticks_in_contact"].as_u64().unwrap() > 300, "{summary}");
+    assert!(summary["peak_force_n"].as_f64().unwrap() > 0.1, "{summary}");
+    assert_eq!((&summary["rollbacks"], &summary["placements"]), (&0.into(), &0.into()), "{summary}");
+}
+
+#[test]
+fn a_tool_put_anew_is_told_to_people_and_programs() {
+    let folder = TempDir::new().unwrap();
+    let (poses, out) = (folder.path().join("jump.csv"), folder.path().join("jump.safetensors"));
+    // Half a metre in 10 ms is fifty times as fast as a tool may be.
+    let header = "time_s,tool,px,py,pz,qx,qy,qz,qw";
+    fs::write(&poses, format!("{header}\n0,probe,0.05,0.03,0.06,0,0,0,1\n0.01,probe,0.55,0.03,0.06,0,0,0,1\n"))
+        .unwrap();
+    assert_eq!(simulate(&poses, &out)["placements"], 1);
+    let (poses, out) = (poses.to_str().unwrap(), out.to_str().unwrap());
+    let said = plicad(&["simulate", "wedge", "--poses", poses, "--out", out]);
+    let said = String::from_utf8_lossy(&said.stdout).into_owned();
+    assert!(said.contains("1 times a tool was placed anew, without a sweep"), "{said}");
+    assert!(!said.contains("rollbacks"), "a line for nothing: {said}");
+}
+
+#[test]
+fn every_command_takes_the_built_in_scene_and_says_so_in_the_same_words() {
+    for command in ["serve", "simulate", "check", "train", "evaluate", "bench", "chart"] {
+        let help = plicad(&[command, "--help"]);
+        let help = String::from_utf8_lossy(&help.stdout).into_owned();
+        assert!(help.contains("or `wedge`, the built-in one"), "{command}: {help}");
+        assert!(!help.contains('\\'), "{command}: {help}");
+    }
+    for (program_name, command) in [("plicad", "simulate"), ("plicad", "demo"), ("plica", "probe")] {
+        let help = Command::new(program(program_name)).args([command, "--help"]).output().unwrap();
+        let words: Vec<String> = String::from_utf8_lossy(&help.stdout).split_whitespace().map(str::to_owned).collect();
+        let said = words.join(" ");
+        assert!(said.contains("Scales and moves the motion so that its lowest part presses the object"), "{said}");
+    }
+}
+
+#[test]
 fn a_recorded_hand_motion_is_simulated() {
     let recorded = repository().join("../shared/data/poses/handheld_xyz.tum");
     if !recorded.exists() {
@@ -352,7 +393,7 @@ impl Daemon {
         let endpoint = format!("tcp/127.0.0.1:{port}");
         let mut command = Command::new(program("plicad"));
         let data = TempDir::new().unwrap();
-        command.args(["serve", "--listen", &endpoint, "--data", data.path().to_str().unwrap()]);
+        command.args(["serve", "wedge", "--listen", &endpoint, "--data", data.path().to_str().unwrap()]);
         let process = command.stderr(Stdio::null()).spawn().unwrap();
         let daemon = Self { process, endpoint, _data: data };
         let deadline = Instant::now() + Duration::from_secs(60);

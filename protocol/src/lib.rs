@@ -9,6 +9,7 @@
 
 mod bytes;
 pub mod chunk;
+pub mod connection;
 pub mod encoding;
 mod error;
 pub mod jobs;

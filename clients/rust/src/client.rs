@@ -12,6 +12,7 @@ use zenoh::{Session, Wait};
 use crate::error::ClientError;
 use crate::options::ClientOptions;
 use crate::publish::PosePublisher;
+use crate::reach::cause;
 
 /// Longest wait for Zenoh's close, which can hang for 10 s.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
@@ -38,9 +39,9 @@ impl Client {
     pub fn connect(options: &ClientOptions) -> Result<Self, ClientError> {
         let keys = Keys::new(&options.session)?;
         let config = options.zenoh_config()?;
-        let session = zenoh::open(config)
+        let session = zenoh::open(config.clone())
             .wait()
-            .map_err(|error| ClientError::Connect { place: options.place(), message: error.to_string() })?;
+            .map_err(|error| ClientError::Connect { problem: cause(options, &config), detail: error.to_string() })?;
         let publishers = Mutex::new(HashMap::new());
         Ok(Self { session, keys, place: options.place(), timeout: options.timeout, publishers })
     }

@@ -27,6 +27,7 @@ pub mod pattern;
 mod publish;
 mod query;
 mod queue;
+mod reach;
 pub mod recording;
 mod subscribe;
 

@@ -6,9 +6,9 @@ use thiserror::Error;
 /// Why a GLB is not a mesh of the protocol.
 #[derive(Debug, Error)]
 pub enum MeshError {
-    /// Not a GLB file.
-    #[error("not a GLB: {0}")]
-    Gltf(#[from] Box<gltf::Error>),
+    /// Not a GLB file; the field is the text of the library that read it.
+    #[error("not a GLB file of this project, or one cut short")]
+    Gltf(String),
     /// No triangles with positions.
     #[error("the GLB has no mesh with positions")]
     Empty,
@@ -32,7 +32,7 @@ pub fn rest_positions(glb: &[u8]) -> Result<Vec<[f32; 3]>, MeshError> {
 
 /// Rest positions and triangles.
 pub fn rest_mesh(glb: &[u8]) -> Result<RestMesh, MeshError> {
-    let gltf = Gltf::from_slice(glb).map_err(Box::new)?;
+    let gltf = Gltf::from_slice(glb).map_err(|error| MeshError::Gltf(error.to_string()))?;
     let primitive = gltf.meshes().flat_map(|mesh| mesh.primitives()).next().ok_or(MeshError::Empty)?;
     let reader = primitive.reader(|_| gltf.blob.as_deref());
     let positions_m: Vec<_> = reader.read_positions().ok_or(MeshError::Empty)?.collect();

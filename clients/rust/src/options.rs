@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use plica_protocol::connection::{Endpoint, config_fault};
 use plica_protocol::{DEFAULT_ENDPOINT, DEFAULT_SESSION};
 use zenoh::Config;
 
@@ -43,10 +44,19 @@ impl ClientOptions {
 
     /// Client mode, one endpoint, no scouting; or the configuration file.
     pub(crate) fn zenoh_config(&self) -> Result<Config, ClientError> {
-        let fault = |error: zenoh::Error| ClientError::Config { place: self.place(), message: error.to_string() };
+        let fault = |error: zenoh::Error| {
+            let detail = error.to_string();
+            ClientError::Config { file: self.place(), problem: config_fault(&detail), detail }
+        };
         if let Some(file) = &self.config_file {
+            let unreadable = |error: std::io::Error| {
+                let (problem, detail) = (format!(" cannot be read ({error})"), error.to_string());
+                ClientError::Config { file: self.place(), problem, detail }
+            };
+            std::fs::File::open(file).map_err(unreadable)?;
             return Config::from_file(file).map_err(fault);
         }
+        Endpoint::parse(&self.endpoint)?;
         let endpoints = serde_json::json!([self.endpoint]).to_string();
         let timeout_ms = self.timeout.as_millis().to_string();
         let settings = [

@@ -109,7 +109,7 @@ impl Client {
         let key = self.keys.skin(object);
         let reply = self.ask(&key, None)?;
         let message = SkinMessage::decode(reply.payload().to_bytes().into_owned());
-        message.map_err(|source| ClientError::Malformed { key, source })
+        message.map_err(|problem| ClientError::Malformed { key, problem })
     }
 
     fn fetch_whole(&self, key: &str) -> Result<Vec<u8>, ClientError> {
@@ -191,12 +191,12 @@ fn parse_json<T: DeserializeOwned>(key: &str, bytes: &[u8]) -> Result<T, ClientE
     let malformed = |error: serde_json::Error| DecodeError::Json(error.to_string());
     serde_json::from_slice(bytes)
         .map_err(malformed)
-        .map_err(|source| ClientError::Malformed { key: key.to_owned(), source })
+        .map_err(|problem| ClientError::Malformed { key: key.to_owned(), problem })
 }
 
 pub(crate) fn chunk_header(key: &str, reply: &Sample) -> Result<ChunkHeader, ClientError> {
     let attachment = reply.attachment().map(|bytes| bytes.to_bytes().into_owned()).unwrap_or_default();
-    ChunkHeader::from_json(&attachment).map_err(|source| ClientError::Malformed { key: key.to_owned(), source })
+    ChunkHeader::from_json(&attachment).map_err(|problem| ClientError::Malformed { key: key.to_owned(), problem })
 }
 
 pub(crate) fn check_piece(key: &str, header: &ChunkHeader, have: u64, got: usize) -> Result<(), ClientError> {
@@ -207,7 +207,7 @@ pub(crate) fn check_piece(key: &str, header: &ChunkHeader, have: u64, got: usize
 }
 
 fn wrong_length(key: &str, expected: u64, got: u64) -> ClientError {
-    ClientError::Malformed { key: key.to_owned(), source: DecodeError::Length { expected, got } }
+    ClientError::Malformed { key: key.to_owned(), problem: DecodeError::Length { expected, got } }
 }
 
 /// Compares the checksum of the received bytes with the announced one.

@@ -92,6 +92,56 @@ fn nobody_there_is_said_at_once() {
     let error = Client::connect(&options).unwrap_err().to_string();
     assert!(error.starts_with(&format!("no plicad answered on tcp/127.0.0.1:{port}: start one with `plicad serve`")));
     assert!(started.elapsed() < LONG, "{:?}", started.elapsed());
+    assert!(error.ends_with("or wait if it is still starting"), "{error}");
     let options = ClientOptions { endpoint: "nonsense".to_owned(), ..ClientOptions::default() };
-    assert!(matches!(Client::connect(&options), Err(ClientError::Config { .. })));
+    assert!(matches!(Client::connect(&options), Err(ClientError::Endpoint(_))));
+}
+
+#[test]
+fn a_failed_connection_is_told_with_its_cause_and_without_the_text_of_zenoh() {
+    // Accepts and says nothing, as a program that is no daemon.
+    let other = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = other.local_addr().unwrap().port();
+    let to = |endpoint: String| ClientOptions { endpoint, timeout: Duration::from_secs(1), ..ClientOptions::default() };
+    for (options, expected) in [
+        (
+            to("foo/1.2.3.4:5".into()),
+            "`foo/1.2.3.4:5` is not an endpoint: the transport `foo` is not one of tcp, tls; ",
+        ),
+        (to("tcp/127.0.0.1".into()), "`tcp/127.0.0.1` is not an endpoint: no `:PORT` at the end; expected "),
+        (
+            to("tcp/no-such-host.invalid:7447".into()),
+            "no plicad answered on tcp/no-such-host.invalid:7447: no host is known as `no-such-host.invalid`; check its name",
+        ),
+        (to(format!("tcp/127.0.0.1:{port}")), "a program listens on tcp/127.0.0.1:"),
+        (to(format!("tls/127.0.0.1:{port}")), "tls/127.0.0.1:"),
+    ] {
+        let error = Client::connect(&options).unwrap_err();
+        let text = error.to_string();
+        assert!(text.starts_with(expected) && !text.contains(".rs"), "{text}");
+        if let ClientError::Connect { detail, .. } = &error {
+            assert!(detail.contains("Unable to connect"), "the text of Zenoh is kept: {detail}");
+        }
+    }
+}
+
+#[test]
+fn faults_of_a_configuration_file_name_file_line_and_key() {
+    let folder = tempfile::TempDir::new().unwrap();
+    let refused = |name: &str, text: &str| {
+        let file = folder.path().join(name);
+        std::fs::write(&file, text).unwrap();
+        Client::connect(&ClientOptions { config_file: Some(file), ..ClientOptions::default() }).unwrap_err().to_string()
+    };
+    let text = refused("key.json5", "{\n  mode: \"client\",\n  nokey: 1,\n}");
+    assert!(text.ends_with("key.json5:3: unknown key `nokey`; configs/zenoh has working files"), "{text}");
+    let text = refused("bad.json5", "{\n  mode: \n}");
+    assert!(text.contains("bad.json5:") && text.contains(": not valid JSON5; "), "{text}");
+    let closed = "mode: \"client\", connect: {endpoints: [\"tls/127.0.0.1:9\"], timeout_ms: 100}";
+    let tls = format!("{{{closed}, transport: {{link: {{tls: {{root_ca_certificate: \"/no/such.pem\"}}}}}}}}");
+    let text = refused("tls.json5", &tls);
+    assert!(text.contains("tls.json5: `root_ca_certificate` is /no/such.pem, which cannot be read (No such"), "{text}");
+    let options = ClientOptions { config_file: Some("no/such.json5".into()), ..ClientOptions::default() };
+    let text = Client::connect(&options).unwrap_err().to_string();
+    assert!(text.starts_with("no/such.json5: cannot be read (No such file"), "{text}");
 }

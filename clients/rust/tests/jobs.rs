@@ -103,6 +103,10 @@ fn the_examples_of_a_job_or_of_a_file_are_activated() {
     let reply = ask(&daemon, &["activate", DONE]);
     assert_eq!((&reply["examples"], &reply["database_generation"]), (&8.into(), &2.into()), "{reply}");
     assert_eq!(daemon.client().activate("wedge.safetensors").unwrap().examples, 9);
+    for id in ["0009", "none"] {
+        let (message, _) = error(&daemon, &["activate", id]);
+        assert!(message.ends_with(&format!(": no job and no file `{id}`; see `plica jobs list`")), "{message}");
+    }
 }
 
 #[test]

@@ -7,6 +7,10 @@ use crate::pose::TrackedPose;
 use crate::terrain::Terrain;
 use crate::workspace::Workspace;
 
+/// Help text of `--fit` in every command that has it.
+pub const FIT_HELP: &str =
+    "Scales and moves the motion so that its lowest part presses the object; each tool starts upright";
+
 /// Default depth of a fitted motion, at most \[m\].
 const DEPTH_M: f64 = 0.008;
 /// Default depth at most, as a share of the object's height in its middle.

@@ -28,7 +28,7 @@ mod time;
 mod workspace;
 
 pub use error::TrajectoryError;
-pub use fit::{Fit, fit, fit_above, fitted_depth_m};
+pub use fit::{FIT_HELP, Fit, fit, fit_above, fitted_depth_m};
 pub use gate::Gate;
 pub use options::{OnBadRow, QuaternionOrder, ReadOptions};
 pub use pose::TrackedPose;

@@ -7,7 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use plica_daemon::bus::BusOptions;
 use plica_jobs::{Keep, Priority};
 use plica_protocol::{DEFAULT_ENDPOINT, DEFAULT_SESSION};
-use plica_trajectory::{OnBadRow, QuaternionOrder, ReadOptions, TimeUnit};
+use plica_trajectory::{FIT_HELP, OnBadRow, QuaternionOrder, ReadOptions, TimeUnit};
 
 /// Simulates a soft object that tools touch, at 1 kHz, and serves it on a Zenoh bus.
 #[derive(Debug, Parser)]
@@ -83,8 +83,9 @@ impl BusArgs {
 /// `plicad serve`.
 #[derive(Debug, Args)]
 pub struct ServeArgs {
-    /// Scene file [default: the built-in wedge].
-    pub scene: Option<PathBuf>,
+    /// Scene.
+    #[arg(default_value = "wedge", help = SCENE_HELP)]
+    pub scene: PathBuf,
     /// Endpoint and session of the daemon.
     #[command(flatten)]
     pub bus: BusArgs,
@@ -155,6 +156,8 @@ impl From<JobPriority> for Priority {
     }
 }
 
+const SCENE_HELP: &str = "Scene file, or `wedge`, the built-in one";
+const BENCH_SCENE_HELP: &str = "Scene file with a [bench] table, or `wedge`, the built-in one";
 const DATA_HELP: &str =
     "Folder for jobs and their results; one daemon at a time uses it [default: ~/.local/share/plica/SESSION]";
 
@@ -246,7 +249,8 @@ impl PoseFileArgs {
 /// `plicad simulate`.
 #[derive(Debug, Args)]
 pub struct SimulateArgs {
-    /// Scene file, or `wedge` for the built-in one.
+    /// Scene.
+    #[arg(help = SCENE_HELP)]
     pub scene: PathBuf,
     /// Poses: CSV (time_s,tool,px,py,pz,qx,qy,qz,qw) or a TUM trajectory; the first one plays at 0.
     #[arg(long, value_name = "FILE")]
@@ -266,8 +270,8 @@ pub struct SimulateArgs {
     /// Ticks per frame.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub every: u64,
-    /// Maps the trajectory's box into the workspace above the object.
-    #[arg(long)]
+    /// Scales and moves the motion onto the object.
+    #[arg(long, help = FIT_HELP)]
     pub fit: bool,
     /// Tool of poses without a tool name; required if the scene has several tools.
     #[arg(long, value_name = "NAME")]
@@ -277,7 +281,8 @@ pub struct SimulateArgs {
 /// `plicad bench`.
 #[derive(Debug, Args)]
 pub struct BenchArgs {
-    /// Scene file with a \[bench\] table, or `wedge` for the built-in one.
+    /// Scene with a bench table.
+    #[arg(help = BENCH_SCENE_HELP)]
     pub scene: PathBuf,
     /// Ticks to time; the scene's motion is repeated.
     #[arg(long, default_value_t = 3000, value_parser = clap::value_parser!(u64).range(100..=10_000_000))]
@@ -303,8 +308,8 @@ pub enum Element {
 /// `plicad train`.
 #[derive(Debug, Args)]
 pub struct TrainArgs {
-    /// Scene file, or `wedge` for the built-in one.
-    #[arg(required_unless_present = "job")]
+    /// Scene.
+    #[arg(required_unless_present = "job", help = SCENE_HELP)]
     pub scene: Option<PathBuf>,
     /// Runs or continues the job of an existing folder.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["scene", "out", "folder", "kind", "examples", "seed", "sensitivity"])]
@@ -357,8 +362,9 @@ pub struct DatabaseArgs {
 /// `plicad evaluate`.
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
-    /// Scene file [default: the built-in wedge].
-    pub scene: Option<PathBuf>,
+    /// Scene.
+    #[arg(default_value = "wedge", help = SCENE_HELP)]
+    pub scene: PathBuf,
     /// Training and held-out examples.
     #[command(flatten)]
     pub databases: DatabaseArgs,
@@ -376,7 +382,8 @@ pub struct EvaluateArgs {
 /// `plicad chart`.
 #[derive(Debug, Args)]
 pub struct ChartArgs {
-    /// Scene file with a \[bench\] table, or `wedge` for the built-in one.
+    /// Scene with a bench table.
+    #[arg(help = BENCH_SCENE_HELP)]
     pub scene: PathBuf,
     /// Training and held-out examples.
     #[command(flatten)]
@@ -398,7 +405,8 @@ pub struct ChartArgs {
 /// `plicad check`.
 #[derive(Debug, Args)]
 pub struct CheckArgs {
-    /// Scene file, or `wedge` for the built-in one.
+    /// Scene.
+    #[arg(help = SCENE_HELP)]
     pub scene: PathBuf,
 }
 
@@ -424,8 +432,8 @@ pub struct DemoArgs {
     /// How the file is read.
     #[command(flatten)]
     pub reading: PoseFileArgs,
-    /// Maps the trajectory's box into the workspace above the object.
-    #[arg(long, requires = "poses")]
+    /// Scales and moves the motion onto the object.
+    #[arg(long, requires = "poses", help = FIT_HELP)]
     pub fit: bool,
     /// Folder for pictures, GLB and the examples of the first run.
     #[arg(long, value_name = "DIR", default_value = "out")]

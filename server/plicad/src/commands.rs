@@ -35,10 +35,14 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
     }
 }
 
-/// The scene of a path; `wedge`, where no such file exists, is the built-in one.
+/// Whether a path means the built-in scene: `wedge`, where no such file exists.
+fn is_built_in(path: &Path) -> bool {
+    path == Path::new("wedge") && !path.is_file()
+}
+
+/// The scene of a path, or the built-in one.
 fn scene(path: &Path) -> Result<Config, ConfigError> {
-    let is_built_in = path == Path::new("wedge") && !path.exists();
-    let config = if is_built_in { Config::built_in() } else { Config::from_file(path) }?;
+    let config = if is_built_in(path) { Config::built_in() } else { Config::from_file(path) }?;
     config.remarks().iter().for_each(|remark| tracing::warn!("{}: {remark}", config.file().display()));
     Ok(config)
 }

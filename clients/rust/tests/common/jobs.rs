@@ -46,7 +46,7 @@ fn job(id: &str, state: JobState) -> Job {
     }
 }
 
-fn find(id: &str) -> Result<Job, ErrorReply> {
+pub(crate) fn find(id: &str) -> Result<Job, ErrorReply> {
     let state = match id {
         DONE | BROKEN => JobState::Done,
         FAILED => JobState::Failed,

@@ -5,11 +5,16 @@
 pub(crate) mod jobs;
 
 use std::net::TcpListener;
+use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::{AtomicBool, AtomicU64};
+use std::sync::{Arc, Mutex};
 
 use plica_client::protocol::chunk::{CHUNK_BYTES, ChunkHeader, offset_of, piece};
 use plica_client::protocol::keys::Keys;
 use plica_client::protocol::pose::Pose;
-use plica_client::protocol::rpc::{ActivateRequest, ErrorReply, Method, StepReply, StepRequest, decode_request};
+use plica_client::protocol::rpc::{
+    ActivateRequest, ErrorCode, ErrorReply, Method, StepReply, StepRequest, decode_request,
+};
 use plica_client::protocol::skin::{self, SkinHeader};
 use plica_client::protocol::status::{ObjectStatus, Status, ToolStatus};
 use plica_client::protocol::wrench::Wrench;
@@ -24,6 +29,10 @@ use zenoh::{Config, Session, Wait};
 pub(crate) struct SmallDaemon {
     pub(crate) session: Session,
     pub(crate) endpoint: String,
+    /// Whether another source seems to move each tool: poses are rejected, and counted in the status.
+    pub(crate) conflicts: Arc<AtomicBool>,
+    /// Positions received.
+    pub(crate) positions_m: Arc<Mutex<Vec<[f64; 3]>>>,
 }
 
 impl SmallDaemon {
@@ -47,15 +56,23 @@ impl SmallDaemon {
             config.insert_json5(key, &value).unwrap();
         }
         let session = zenoh::open(config).wait().unwrap();
-        Self { session, endpoint }
+        Self { session, endpoint, conflicts: Arc::default(), positions_m: Arc::default() }
     }
 
     fn serve(&self) {
         let keys = Keys::new("main").unwrap();
         let (session, echo_keys) = (self.session.clone(), keys.clone());
+        let (conflicts, positions_m) = (Arc::clone(&self.conflicts), Arc::clone(&self.positions_m));
+        let n_rejected = Arc::new(AtomicU64::new(0));
+        let in_status = Arc::clone(&n_rejected);
         let echo = self.session.declare_subscriber(keys.pose("*")).callback(move |sample| {
             let tool = echo_keys.tool_of_pose(sample.key_expr().as_str()).unwrap().to_owned();
             let pose = Pose::decode(&sample.payload().to_bytes()).unwrap();
+            positions_m.lock().unwrap().push(pose.position_m);
+            if conflicts.load(Relaxed) {
+                n_rejected.fetch_add(1, Relaxed);
+                return;
+            }
             let wrench = Wrench {
                 sequence: pose.sequence,
                 pose_sequence: pose.sequence,
@@ -67,14 +84,19 @@ impl SmallDaemon {
         });
         echo.background().wait().unwrap();
         self.queryable(&keys.mesh("*"), serve_mesh);
-        self.queryable(&keys.status(), |query| {
+        self.queryable(&keys.status(), move |query: Query| {
             let mut status = Status { scene: "small".to_owned(), ..Status::default() };
             status.objects.insert("wedge".to_owned(), ObjectStatus::default());
-            status.tools.insert("probe".to_owned(), ToolStatus::default());
+            let mut tool = ToolStatus::default();
+            let n_rejected = in_status.load(Relaxed);
+            if n_rejected > 0 {
+                tool.poses_rejected.insert("conflict".to_owned(), n_rejected);
+            }
+            status.tools.insert("probe".to_owned(), tool);
             query.reply(query.key_expr().clone(), serde_json::to_vec(&status).unwrap()).wait().unwrap();
         });
         self.queryable(&keys.rpc("*"), serve_rpc);
-        self.queryable(&keys.skin("wedge"), |query| {
+        self.queryable(&keys.skin("wedge"), |query: Query| {
             query.reply(query.key_expr().clone(), frame(7)).wait().unwrap();
         });
     }
@@ -83,7 +105,7 @@ impl SmallDaemon {
         put(&self.session, key, bytes);
     }
 
-    fn queryable(&self, key: &str, answer: fn(Query)) {
+    fn queryable(&self, key: &str, answer: impl Fn(Query) + Send + Sync + 'static) {
         self.session.declare_queryable(key.to_owned()).callback(answer).background().wait().unwrap();
     }
 
@@ -164,7 +186,14 @@ fn answer_rpc(name: &str, payload: &[u8]) -> Result<serde_json::Value, ErrorRepl
         }
         Method::Activate => {
             let request: ActivateRequest = decode_request(payload)?;
-            let n_examples = if request.job().is_some() { 8 } else { 9 };
+            let n_examples = match request.job() {
+                Some(id) => jobs::find(id).map(|_| 8)?,
+                None if request.database == "none" => {
+                    let message = "none: cannot be read: No such file or directory (os error 2)";
+                    return Err(ErrorReply::new(ErrorCode::BadDatabase, message));
+                }
+                None => 9,
+            };
             Ok(json!({"tick": 5, "database_generation": 2, "examples": n_examples}))
         }
         method if method.is_about_jobs() => jobs::answer(method, payload),

@@ -1,5 +1,7 @@
 //! Errors of the bus.
 
+use plica_protocol::connection::EndpointError;
+
 /// Why the bus cannot be opened. Each message says what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum BusError {
@@ -13,12 +15,15 @@ pub enum BusError {
         /// Process that holds it, if visible.
         owner: String,
     },
+    /// The endpoint is malformed.
+    #[error("--listen: {0}")]
+    Endpoint(#[from] EndpointError),
     /// The configuration file cannot be used.
-    #[error("{file}: {problem}; see configs/zenoh for working files")]
+    #[error("{file}:{problem}; configs/zenoh has working files")]
     Config {
         /// The file.
         file: String,
-        /// Error of Zenoh.
+        /// Line, if it is known, and fault.
         problem: String,
     },
     /// The session name cannot be part of a key.
@@ -30,13 +35,21 @@ pub enum BusError {
         /// The other one.
         other: String,
     },
-    /// Any other error of Zenoh.
-    #[error("the bus cannot be opened on {endpoint}: {problem}")]
-    Zenoh {
+    /// The endpoint cannot be listened on, or a file of the configuration cannot be used.
+    #[error("cannot listen on {endpoint}: {problem}")]
+    Listen {
         /// Requested endpoint.
         endpoint: String,
-        /// Error of Zenoh.
+        /// Cause and remedy.
         problem: String,
+    },
+    /// A key cannot be served.
+    #[error(
+        "the bus does not take {root}: is it restricted by access control in --zenoh-config? (--verbose adds the text of Zenoh)"
+    )]
+    Declare {
+        /// First part of the keys.
+        root: String,
     },
     /// A thread cannot be started.
     #[error("a thread cannot be started: {0}")]

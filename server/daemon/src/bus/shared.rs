@@ -37,7 +37,8 @@ impl Shared {
     }
 
     pub(super) fn error(&self, problem: zenoh::Error) -> BusError {
-        BusError::Zenoh { endpoint: self.keys.root().to_owned(), problem: problem.to_string() }
+        tracing::info!("Zenoh: {problem}");
+        BusError::Declare { root: self.keys.root().to_owned() }
     }
 
     /// The error of a query for an object that the scene does not have. A wildcard asks for the one it has.

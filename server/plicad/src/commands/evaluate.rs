@@ -4,7 +4,6 @@ mod databases;
 mod table;
 
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -16,7 +15,7 @@ use plica_scene::setup::setup;
 
 /// Evaluates methods and prints their errors.
 pub fn run(args: &EvaluateArgs, json: bool) -> anyhow::Result<()> {
-    let config = super::scene(args.scene.as_deref().unwrap_or(Path::new("wedge")))?;
+    let config = super::scene(&args.scene)?;
     let setup = setup(&config)?;
     let methods = chosen(methods(setup.stamp_axes), &args.methods)?;
     let Databases { training, held_out } = read(&config, &setup, &args.databases)?;

@@ -21,10 +21,7 @@ const LOOK_AROUND: Duration = Duration::from_millis(100);
 pub fn run(args: &ServeArgs, json: bool) -> anyhow::Result<()> {
     // Registered first, so that a signal during the start is not lost.
     let mut signals = Signals::new([SIGINT, SIGTERM]).context("cannot listen for signals")?;
-    let mut config = args.scene.as_deref().map_or_else(Config::built_in, Config::from_file)?;
-    if let Some(file) = &args.database {
-        config.set_database(file.clone());
-    }
+    let config = super::scene_with(&args.scene, &args.database)?;
     let options = BusOptions { databases: args.databases.clone(), ..args.bus.options() };
     let mut server = Server::start_with_jobs(&config, &options, args.lock_step, || open_jobs(args, &config))?;
     for warning in &server.grants().warnings {
@@ -67,7 +64,7 @@ fn open_jobs(args: &ServeArgs, config: &Config) -> Result<(Jobs, Option<Supervis
         Err(error @ DataFolderError::Locked { .. }) => return Err(error),
         Err(error) => return Ok(without_jobs(&error.to_string(), error.without_place())),
     };
-    let scene_folder = args.scene.as_ref().and_then(|file| file.parent()).map(Path::to_owned);
+    let scene_folder = args.scene.parent().filter(|_| !super::is_built_in(&args.scene)).map(Path::to_owned);
     let served = ServedScene { name: config.name().to_owned(), folder: scene_folder, text: config.text().to_owned() };
     let launch = Launch::own(args.job_priority.into(), config.runtime().cpu());
     let started = launch.and_then(|launch| Jobs::start(folder, served, launch, args.keep()));

@@ -33,11 +33,26 @@ pub fn run(args: &SimulateArgs, json: bool) -> anyhow::Result<()> {
         println!("{}: {frames} frames of {ticks} ticks", args.out.display());
         let (contact, peak) = (&summary["ticks_in_contact"], summary["peak_force_n"].as_f64().unwrap_or(0.0));
         println!("{contact} ticks in contact, peak force {peak:.3} N");
+        let (rollbacks, placements) = (count(&summary["rollbacks"]), count(&summary["placements"]));
+        if rollbacks > 0 {
+            println!(
+                "{rollbacks} rollbacks: the last good state was restored, and forces there mean nothing; try a shorter runtime.timestep_s"
+            );
+        }
+        if placements > 0 {
+            println!(
+                "{placements} times a tool was placed anew, without a sweep: a pose was too far from the one before it"
+            );
+        }
         if contact == 0 && !args.fit {
             println!("nothing was touched: is the motion where the object is? --fit moves it there");
         }
     }
     Ok(())
+}
+
+fn count(value: &serde_json::Value) -> u64 {
+    value.as_u64().unwrap_or(0)
 }
 
 fn simulate(config: &Config, motion: &Motion, args: &SimulateArgs) -> anyhow::Result<serde_json::Value> {
@@ -76,10 +91,12 @@ fn simulate(config: &Config, motion: &Motion, args: &SimulateArgs) -> anyhow::Re
         progress.inc(1);
     }
     progress.finish_and_clear();
+    let placements: u64 = replay.core().state().tools().iter().map(|tool| tool.placements).sum();
     file.finish().with_context(|| args.out.display().to_string())?;
     Ok(serde_json::json!({
         "scene": config.name(), "out": args.out, "n_ticks": n_ticks, "n_frames": n_frames,
         "n_skin": shape.n_skin, "n_tools": shape.n_tools, "rollbacks": replay.core().state().rollbacks(),
+        "placements": placements,
         "ticks_in_contact": ticks_in_contact, "peak_force_n": peak_force_n, "dropped_contacts": dropped_contacts,
         "motion": motion.report, "remarks": motion.remarks,
     }))

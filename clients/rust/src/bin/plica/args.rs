@@ -4,11 +4,11 @@ pub(crate) mod jobs;
 
 use std::path::PathBuf;
 
-use clap::{Parser, Subcommand, ValueEnum};
+use clap::{ArgGroup, Parser, Subcommand, ValueEnum};
 use plica_client::pattern::Pattern;
 use plica_client::protocol::{DEFAULT_ENDPOINT, DEFAULT_SESSION};
 use plica_client::{Client, ClientError, ClientOptions};
-use plica_trajectory::{OnBadRow, QuaternionOrder, ReadOptions, TimeUnit};
+use plica_trajectory::{FIT_HELP, OnBadRow, QuaternionOrder, ReadOptions, TimeUnit};
 
 /// Queries, drives, records and replays a running plicad.
 #[derive(Debug, Parser)]
@@ -35,6 +35,9 @@ pub(crate) struct Common {
     /// Print one JSON object as the last line of standard output.
     #[arg(long, global = true)]
     pub(crate) json: bool,
+    /// Add the text of the library beneath to an error.
+    #[arg(short, long, global = true)]
+    pub(crate) verbose: bool,
 }
 
 impl Common {
@@ -56,7 +59,7 @@ pub(crate) enum Command {
     Probe(Probe),
     /// Write poses (and skins and wrenches) to an MCAP file until Ctrl-C.
     Record(Record),
-    /// Publish the poses of a recording, byte by byte.
+    /// Publish the poses of a recording (MCAP) in order of their times, byte by byte.
     Replay(Replay),
     /// Submit, watch and fetch long-running work: examples for enrichment.
     #[command(subcommand)]
@@ -65,7 +68,7 @@ pub(crate) enum Command {
     Rpc(Rpc),
     /// Measure the time from a pose to the resulting force.
     Latency(Latency),
-    /// Write the mesh or the present skin to a file.
+    /// Write the mesh, the present skin, or both to files.
     Export(Export),
 }
 
@@ -133,8 +136,7 @@ pub(crate) struct Probe {
     /// Plays a trajectory of more than an hour.
     #[arg(long, requires = "poses")]
     pub(crate) no_limits: bool,
-    /// Scale and move the trajectory so that it presses the object, as plicad's --fit does; the tool starts upright.
-    #[arg(long, requires = "poses")]
+    #[arg(long, requires = "poses", help = FIT_HELP)]
     pub(crate) fit: bool,
 }
 
@@ -246,13 +248,15 @@ pub(crate) struct Latency {
     pub(crate) motion: Motion,
 }
 
+/// Either file suffices.
 #[derive(Debug, clap::Args)]
+#[command(group = ArgGroup::new("files").args(["mesh", "skin"]).required(true).multiple(true))]
 pub(crate) struct Export {
     /// Object to write; may be left out if the scene has one object.
     #[arg(long)]
     pub(crate) object: Option<String>,
     /// File for the mesh (GLB).
-    #[arg(long, required_unless_present = "skin")]
+    #[arg(long)]
     pub(crate) mesh: Option<PathBuf>,
     /// File for the present skin, as the message of the protocol.
     #[arg(long)]

@@ -7,6 +7,7 @@ pub(crate) mod latency;
 mod motion;
 pub(crate) mod probe;
 pub(crate) mod record;
+mod rejected;
 pub(crate) mod replay;
 
 use std::collections::BTreeMap;

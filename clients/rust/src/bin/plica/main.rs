@@ -17,7 +17,7 @@ fn main() -> ExitCode {
         Ok(args) => args,
         Err(answer) => return Output::say(&answer),
     };
-    let output = Output { json: args.common.json };
+    let output = Output { json: args.common.json, verbose: args.common.verbose };
     match run(&args, output) {
         Ok(code) => code,
         Err(error) => {

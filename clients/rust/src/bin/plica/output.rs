@@ -5,12 +5,16 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use plica_client::ClientError;
+use plica_client::mesh::MeshError;
+use plica_client::recording::RecordingError;
 use serde_json::{Value, json};
 
 /// Text for people, or one JSON object as the last line of standard output; never both on standard output.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Output {
     pub(crate) json: bool,
+    /// Whether errors show the text of the library beneath.
+    pub(crate) verbose: bool,
 }
 
 impl Output {
@@ -26,6 +30,9 @@ impl Output {
     /// The end of a command that failed; with the code, if the daemon refused.
     pub(crate) fn error(self, error: &anyhow::Error) {
         eprintln!("plica: {error:#}");
+        if let Some(detail) = detail(error).filter(|_| self.verbose) {
+            eprintln!("plica: {detail}");
+        }
         if !self.json {
             return;
         }
@@ -56,6 +63,19 @@ impl Output {
     pub(crate) fn note(self, text: &str) {
         eprintln!("plica: {text}");
     }
+}
+
+/// Text of the library beneath an error.
+fn detail(error: &anyhow::Error) -> Option<&str> {
+    error.chain().find_map(|cause| {
+        let client = cause.downcast_ref::<ClientError>().and_then(ClientError::detail);
+        let recording = || cause.downcast_ref::<RecordingError>().and_then(|error| error.detail.as_deref());
+        let mesh = || match cause.downcast_ref()? {
+            MeshError::Gltf(text) => Some(text.as_str()),
+            MeshError::Empty => None,
+        };
+        client.or_else(recording).or_else(mesh)
+    })
 }
 
 /// A bar on standard error, shown on a terminal only; without a length it spins.

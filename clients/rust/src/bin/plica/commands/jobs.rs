@@ -9,9 +9,10 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use anyhow::Context;
-use plica_client::Client;
 use plica_client::protocol::jobs::{Job, JobSubmitRequest};
 use plica_client::protocol::keys::check_name;
+use plica_client::protocol::rpc::{ErrorCode, ErrorReply};
+use plica_client::{Client, ClientError};
 use serde_json::json;
 
 use crate::args::jobs::{Jobs, Resume, Submit};
@@ -33,7 +34,7 @@ pub(crate) fn run(client: &Client, jobs: &Jobs, output: Output) -> anyhow::Resul
 }
 
 fn activate(client: &Client, id: &str, output: Output) -> anyhow::Result<ExitCode> {
-    let reply = client.activate(id)?;
+    let reply = client.activate(id).map_err(|error| unknown(id, error))?;
     let (examples, generation) = (reply.examples, reply.database_generation);
     let text = format!(
         "{examples} examples of {} enrich the skin from tick {} on, as generation {generation}",
@@ -42,6 +43,19 @@ fn activate(client: &Client, id: &str, output: Output) -> anyhow::Result<ExitCod
     );
     output.result(&json!(reply), &text);
     Ok(ExitCode::SUCCESS)
+}
+
+/// An id that is neither a job nor a file.
+fn unknown(id: &str, error: ClientError) -> ClientError {
+    match error {
+        ClientError::Refused(reply)
+            if reply.code == ErrorCode::UnknownJob.name() || reply.message.contains("No such file") =>
+        {
+            let message = format!("no job and no file `{id}`; see `plica jobs list`");
+            ClientError::Refused(ErrorReply { message, ..reply })
+        }
+        error => error,
+    }
 }
 
 fn submit(client: &Client, submit: &Submit, output: Output) -> anyhow::Result<ExitCode> {

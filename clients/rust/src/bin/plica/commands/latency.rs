@@ -10,6 +10,7 @@ use serde_json::json;
 
 use super::Stop;
 use super::motion::plan;
+use super::rejected::{Before, Rejected};
 use crate::args::Latency;
 use crate::output::{Output, progress};
 
@@ -30,6 +31,8 @@ pub(crate) fn run(client: &Client, latency: &Latency, output: Output) -> anyhow:
     let n_poses = (motion.seconds * motion.rate_hz).ceil() as u64;
     let mut source = PoseSource::new();
     let clock = source.clock();
+    let before = Before::new(client);
+    let mut last_m = None;
     let mut echoes = Echoes::new(clock.now_ns())?;
     let bar = progress(Some(n_poses), "poses");
     let (start, mut published) = (Instant::now(), 0_u64);
@@ -38,7 +41,9 @@ pub(crate) fn run(client: &Client, latency: &Latency, output: Output) -> anyhow:
         if !stop.sleep_until(start + Duration::from_secs_f64(time_s)) {
             break;
         }
-        publisher.publish(&source.pose(pattern.position_m(&plan.path, time_s), UPRIGHT))?;
+        let at_m = pattern.position_m(&plan.path, time_s);
+        publisher.publish(&source.pose(at_m, UPRIGHT))?;
+        last_m = Some(at_m);
         published += 1;
         echoes.collect(&wrenches, clock);
         bar.inc(1);
@@ -46,7 +51,10 @@ pub(crate) fn run(client: &Client, latency: &Latency, output: Output) -> anyhow:
     stop.sleep_until(Instant::now() + LAST_ECHO);
     echoes.collect(&wrenches, clock);
     bar.finish_and_clear();
-    report(&echoes.histogram, &plan.tool, published, output)
+    if let Some(last_m) = last_m {
+        plan.lift(last_m, |at_m| publisher.publish(&source.pose(at_m, UPRIGHT)))?;
+    }
+    report(&echoes.histogram, &plan.tool, published, &before.since(client), output)
 }
 
 /// First echo of each source time.
@@ -73,9 +81,19 @@ impl Echoes {
     }
 }
 
-fn report(histogram: &Histogram<u64>, tool: &str, published: u64, output: Output) -> anyhow::Result<()> {
+fn report(
+    histogram: &Histogram<u64>,
+    tool: &str,
+    published: u64,
+    rejected: &Rejected,
+    output: Output,
+) -> anyhow::Result<()> {
     if histogram.is_empty() {
-        bail!("no wrench of `{tool}` echoed a pose: `plica status` shows whether they are rejected");
+        let rejected = rejected.sentences().join("; ");
+        if rejected.is_empty() {
+            bail!("no wrench of `{tool}` echoed a pose, and none was rejected: is the daemon paused, or in lock-step?");
+        }
+        bail!("no wrench of `{tool}` echoed a pose: {rejected}");
     }
     let us = |ns: u64| ns as f64 / 1e3;
     let at = |quantile: f64| us(histogram.value_at_quantile(quantile));
@@ -83,10 +101,11 @@ fn report(histogram: &Histogram<u64>, tool: &str, published: u64, output: Output
     let (p999, max, echoed) = (at(0.999), us(histogram.max()), histogram.len());
     let value = json!({
         "tool": tool, "poses": published, "echoed": echoed,
+        "poses_rejected": rejected.json(),
         "motion_to_force_us": {"count": echoed, "min": min, "p50": p50, "p90": p90, "p99": p99, "p999": p999, "max": max},
     });
     let text =
         format!("motion to force: p50 {p50:.0}, p99 {p99:.0}, max {max:.0} us ({echoed} of {published} poses echoed)");
-    output.result(&value, &text);
+    output.result(&value, &rejected.below(text));
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! `probe`: a scripted tool, or one that follows a recorded trajectory at its own times.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -10,6 +11,7 @@ use serde_json::json;
 
 use super::Stop;
 use super::motion::{Plan, plan};
+use super::rejected::Before;
 use crate::args::{Motion, Probe};
 use crate::output::{Output, progress};
 
@@ -34,6 +36,8 @@ pub(crate) fn run(client: &Client, probe: &Probe, output: Output) -> anyhow::Res
     let bar = progress(Some(poses.len() as u64), "poses");
     let (mut published, mut answers) = (0_u64, Answers::default());
     let mut sources = Sources::default();
+    let before = Before::new(client);
+    let mut last: BTreeMap<&str, &TrackedPose> = BTreeMap::new();
     let start = Instant::now();
     let mut answered = Instant::now();
     for pose in &poses {
@@ -43,10 +47,11 @@ pub(crate) fn run(client: &Client, probe: &Probe, output: Output) -> anyhow::Res
         let tool = pose.tool.as_deref().unwrap_or(&plan.tool);
         client.publish_pose(tool, &sources.of(tool).pose(pose.position_m, pose.orientation_xyzw))?;
         published += 1;
+        last.insert(tool, pose);
         bar.inc(1);
-        let before = wrenches.stats().received;
+        let n_before = wrenches.stats().received;
         answers.collect(&wrenches);
-        if wrenches.stats().received > before {
+        if wrenches.stats().received > n_before {
             answered = Instant::now();
         }
         if answered.elapsed() > SILENCE {
@@ -54,23 +59,28 @@ pub(crate) fn run(client: &Client, probe: &Probe, output: Output) -> anyhow::Res
             client.status()?;
             answered = Instant::now();
         }
-        bar.set_message(format!("{:.3} N", answers.newest_n));
+        bar.set_message(answers.line());
     }
     let seconds = start.elapsed().as_secs_f64();
+    for (tool, pose) in last {
+        let source = sources.of(tool);
+        plan.lift(pose.position_m, |at_m| client.publish_pose(tool, &source.pose(at_m, pose.orientation_xyzw)))?;
+    }
     stop.sleep_until(Instant::now() + LAST_ANSWER);
     answers.collect(&wrenches);
     bar.finish_and_clear();
+    let rejected = before.since(client);
     let (stats, Answers { peak_n, contacts, .. }) = (wrenches.stats(), answers);
     let value = json!({
         "tool": plan.tool, "poses": published, "seconds": seconds, "peak_force_n": peak_n,
         "wrenches_received": stats.received, "wrenches_missed": stats.missed, "wrenches_in_contact": contacts,
-        "motion": report,
+        "motion": report, "poses_rejected": rejected.json(),
     });
     let text = format!(
         "{published} poses to `{}` in {seconds:.1} s; {} wrenches back, {contacts} in contact, peak force {peak_n:.3} N",
         plan.tool, stats.received
     );
-    output.result(&value, &text);
+    output.result(&value, &rejected.below(text));
     Ok(())
 }
 
@@ -80,6 +90,7 @@ struct Answers {
     newest_n: f64,
     peak_n: f64,
     contacts: u64,
+    in_contact: bool,
 }
 
 impl Answers {
@@ -87,14 +98,21 @@ impl Answers {
         while let Some(WrenchMessage { wrench, .. }) = wrenches.try_next() {
             self.newest_n = norm(wrench.force_n);
             self.peak_n = self.peak_n.max(self.newest_n);
-            self.contacts += u64::from(wrench.flags.in_contact);
+            self.in_contact = wrench.flags.in_contact;
+            self.contacts += u64::from(self.in_contact);
         }
+    }
+
+    /// Line that a terminal shows, some times a second.
+    fn line(&self) -> String {
+        let state = if self.in_contact { "in contact" } else { "free" };
+        format!("{state}, {:.3} N, peak {:.3} N", self.newest_n, self.peak_n)
     }
 }
 
 /// Each tool has its own numbering.
 #[derive(Default)]
-struct Sources(std::collections::BTreeMap<String, PoseSource>);
+struct Sources(BTreeMap<String, PoseSource>);
 
 impl Sources {
     fn of(&mut self, tool: &str) -> &mut PoseSource {

@@ -15,6 +15,8 @@ use crate::output::{Output, progress};
 /// Queue of about two seconds of all streams; a full queue drops and counts new messages.
 const WAITING: usize = 4096;
 const LOOK: Duration = Duration::from_millis(50);
+/// Interval after which messages are in the file, however the recorder ends.
+const FLUSH_EVERY: Duration = Duration::from_millis(500);
 const POSE: &str = "pose";
 
 /// Messages written, by kind.
@@ -32,6 +34,7 @@ pub(crate) fn run(client: &Client, record: &Record, output: Output) -> anyhow::R
     output.note(&format!("recording to {}", record.out.display()));
     let bar = progress(None, "messages");
     let start = Instant::now();
+    let mut flushed = start;
     let mut counts = Counts::new();
     let late = || record.seconds.is_some_and(|s| start.elapsed().as_secs_f64() >= s);
     let enough = |counts: &Counts| record.max_poses.is_some_and(|most| counts.get(POSE).copied().unwrap_or(0) >= most);
@@ -39,6 +42,10 @@ pub(crate) fn run(client: &Client, record: &Record, output: Output) -> anyhow::R
         if let Some(message) = messages.next(LOOK) {
             write(&mut recorder, message, clock, &mut counts)?;
             bar.inc(1);
+        }
+        if flushed.elapsed() >= FLUSH_EVERY {
+            recorder.flush()?;
+            flushed = Instant::now();
         }
     }
     // Messages that wait at the end belong to the recording, later ones do not.

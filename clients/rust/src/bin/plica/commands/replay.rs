@@ -1,7 +1,6 @@
 //! `replay`: publishes the poses of a recording, byte by byte, at their recorded times.
 //!
-//! `source_id`, `sequence` and `source_time_ns` stay as recorded, so that recording a replay gives the same bytes. A
-//! daemon that has just accepted the same poses refuses them as repeated until their tool is stale or the daemon is reset;
+//! `source_id`, `sequence` and `source_time_ns` stay as recorded, so that recording a replay gives the same bytes.
 //! `--new-source` gives each replay an id of its own and changes those four bytes only.
 
 use std::collections::HashMap;
@@ -13,6 +12,7 @@ use plica_client::{Client, PosePublisher, PoseSource};
 use serde_json::json;
 
 use super::Stop;
+use super::rejected::Before;
 use crate::args::Replay;
 use crate::output::{Output, progress};
 
@@ -20,7 +20,8 @@ use crate::output::{Output, progress};
 const SOURCE_ID: std::ops::Range<usize> = 24..28;
 
 pub(crate) fn run(client: &Client, replay: &Replay, output: Output) -> anyhow::Result<()> {
-    let poses = poses(replay)?;
+    let poses = poses(replay, output)?;
+    let before = Before::new(client);
     let stop = Stop::on_signals()?;
     let publishers = publishers(client, &poses)?;
     let bar = progress(Some(poses.len() as u64), "poses");
@@ -39,23 +40,28 @@ pub(crate) fn run(client: &Client, replay: &Replay, output: Output) -> anyhow::R
     }
     bar.finish_and_clear();
     let seconds = start.elapsed().as_secs_f64();
-    if new_source.is_none() {
-        output.note("a daemon that has received these poses before refuses them as repeated; --new-source publishes them as new ones");
-    }
-    let value = json!({"file": replay.file, "poses": published, "tools": publishers.len(), "seconds": seconds});
+    let rejected = before.since(client);
+    let value = json!({
+        "file": replay.file, "poses": published, "tools": publishers.len(), "seconds": seconds,
+        "poses_rejected": rejected.json(),
+    });
     let text = format!("{published} poses of {} tool(s) in {seconds:.1} s", publishers.len());
-    output.result(&value, &text);
+    output.result(&value, &rejected.below(text));
     Ok(())
 }
 
-fn poses(replay: &Replay) -> anyhow::Result<Vec<Recorded>> {
-    let is_pose = |message: &Recorded| matches!(message.kind, Kind::Pose | Kind::JsonPose);
-    let poses: Vec<Recorded> =
-        read(&replay.file)?.filter(|message| message.as_ref().map_or(true, is_pose)).collect::<Result<_, _>>()?;
-    if poses.is_empty() {
-        bail!("{}: no poses; was a tracker publishing during the recording?", replay.file.display());
+/// Poses in order of log time.
+fn poses(replay: &Replay, output: Output) -> anyhow::Result<Vec<Recorded>> {
+    let recording = read(&replay.file, &Kind::POSES)?;
+    recording.notes().iter().for_each(|note| output.note(note));
+    if recording.messages.is_empty() {
+        let file = replay.file.display();
+        if recording.n_messages == 0 && !recording.foreign.is_empty() {
+            bail!("{file}: no poses; it holds {}", recording.foreign_messages());
+        }
+        bail!("{file}: no poses; was a tracker publishing during the recording?");
     }
-    Ok(poses)
+    Ok(recording.messages)
 }
 
 /// One publisher per recorded key, in the session of this connection.
