@@ -70,12 +70,10 @@ struct Steady {
 }
 
 impl Steady {
-    /// Moves towards `aim` by at most `step` a tick; an unknown aim is waited for.
+    /// Moves towards `aim` by at most `step` for every tick since it last moved. An unknown aim is waited for, so that a frame is
+    /// as confident as it would be with a frame in every tick before it.
     fn approach(&mut self, aim: Option<f32>, tick: u64, step: f32) {
-        let Some(aim) = aim else {
-            self.tick = tick.saturating_sub(1);
-            return;
-        };
+        let Some(aim) = aim else { return };
         let most = step * tick.saturating_sub(self.tick) as f32;
         self.value += (aim - self.value).clamp(-most, most);
         self.tick = tick;
