@@ -59,7 +59,7 @@ pub(super) fn open(options: &BusOptions) -> Result<Session, BusError> {
     let settings = config.clone();
     let session = zenoh::open(config).wait();
     let session = session.map_err(|error| {
-        tracing::info!("Zenoh: {error}");
+        tracing::debug!("Zenoh: {error}");
         unheard(options, &settings)
     })?;
     refuse_second_daemon(&session, &options.session)?;
@@ -109,7 +109,7 @@ fn config(options: &BusOptions) -> Result<Config, BusError> {
 }
 
 fn config_error(file: String, error: &zenoh::Error) -> BusError {
-    tracing::info!("Zenoh: {error}");
+    tracing::debug!("Zenoh: {error}");
     BusError::Config { file, problem: config_fault(&error.to_string()) }
 }
 

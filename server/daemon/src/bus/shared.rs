@@ -37,7 +37,7 @@ impl Shared {
     }
 
     pub(super) fn error(&self, problem: zenoh::Error) -> BusError {
-        tracing::info!("Zenoh: {problem}");
+        tracing::debug!("Zenoh: {problem}");
         BusError::Declare { root: self.keys.root().to_owned() }
     }
 

@@ -54,6 +54,10 @@ fn unknown(id: &str, error: ClientError) -> ClientError {
             let message = format!("no job and no file `{id}`; see `plica jobs list`");
             ClientError::Refused(ErrorReply { message, ..reply })
         }
+        ClientError::Refused(reply) if reply.message.contains("no id of a job") => {
+            let message = format!("{}; `plica jobs list` shows the jobs", reply.message);
+            ClientError::Refused(ErrorReply { message, ..reply })
+        }
         error => error,
     }
 }
