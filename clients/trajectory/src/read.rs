@@ -83,7 +83,9 @@ fn not_text(bytes: &[u8], at: usize) -> AtLine {
 fn playable(rows: Rows, policy: OnBadRow) -> Result<Rows, AtLine> {
     let step_back = first_step_back(&rows.good);
     let judged = judge(rows);
-    let first = judged.bad.iter().chain(&step_back).min_by_key(|fault| fault.line);
+    // A row out of order is named by the place where time goes back, whichever of the two rows is wrong.
+    let in_order = judged.bad.iter().filter(|fault| step_back.is_none() || fault.kind != BadRow::OutOfOrder);
+    let first = in_order.chain(&step_back).min_by_key(|fault| fault.line);
     let refused = |fault: &Fault| (fault.line, format!("{}; {SKIP}", fault.message));
     match (policy, first) {
         (OnBadRow::Error, Some(fault)) => Err(refused(fault)),
