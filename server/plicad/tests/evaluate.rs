@@ -184,5 +184,5 @@ fn a_chart_has_a_front_and_goes_on_where_it_was() {
     assert_ne!(quick["identity"], first["identity"]);
     fs::write(&file, "{").unwrap();
     let message = errors(&place.run(&arguments));
-    assert!(message.contains("chart.json: is no chart") && message.contains("--fresh"), "{message}");
+    assert!(message.contains("chart.json: is not a chart") && message.contains("--fresh"), "{message}");
 }

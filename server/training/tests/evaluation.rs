@@ -3,6 +3,7 @@
 
 mod common;
 
+use std::error::Error as _;
 use std::ops::ControlFlow;
 
 use plica_training::evaluation::*;
@@ -111,8 +112,9 @@ fn databases_of_another_model_and_empty_regions_are_refused() {
     assert!(message.contains("none of 2 held-out examples"), "{message}");
     let evaluator = Evaluator::new(&setup, &training, &held_out).unwrap();
     let default = &methods(setup.stamp_axes)[0];
-    let message = evaluator.evaluate(default, 1).err().unwrap().to_string();
-    assert!(message.contains("kriging-stamp") && message.contains("at least 2"), "{message}");
+    let error = evaluator.evaluate(default, 1).err().unwrap();
+    let cause = error.source().unwrap().to_string();
+    assert!(error.to_string().contains("kriging-stamp") && cause.contains("at least 2"), "{error}: {cause}");
 }
 
 /// The scene's own model driven anew is as far from the accurate one as the database says; a finer one is nearer.

@@ -70,10 +70,15 @@ struct Steady {
 }
 
 impl Steady {
-    /// Moves towards `aim` by at most `step` for every tick since it last moved. An unknown aim is waited for, so that a frame is
-    /// as confident as it would be with a frame in every tick before it.
-    fn approach(&mut self, aim: Option<f32>, tick: u64, step: f32) {
-        let Some(aim) = aim else { return };
+    /// Moves towards `aim` by at most `step` for every tick since it last moved. While frames are made, ticks with an unknown aim do
+    /// not count; where nobody has had a frame for a while, the first one is as confident as if there had been one in every tick.
+    fn approach(&mut self, aim: Option<f32>, tick: u64, step: f32, is_watched: bool) {
+        let Some(aim) = aim else {
+            if is_watched {
+                self.tick = tick.saturating_sub(1);
+            }
+            return;
+        };
         let most = step * tick.saturating_sub(self.tick) as f32;
         self.value += (aim - self.value).clamp(-most, most);
         self.tick = tick;
@@ -87,6 +92,8 @@ pub struct LiveEnrichment {
     scratch: EnricherScratch,
     tools: Vec<ToolWindows>,
     least_confidence: Steady,
+    /// Tick of the frame last written.
+    written: Option<u64>,
     offsets: Vec<Node>,
     detail: Vec<Node>,
     /// Sum of the windows' shares at each vertex.
@@ -102,6 +109,7 @@ impl LiveEnrichment {
             scratch: enricher.scratch(),
             tools: vec![ToolWindows::default(); model.n_tools()],
             least_confidence: Steady::default(),
+            written: None,
             offsets: vec![[0.0; 4]; n_skin],
             detail: vec![[0.0; 4]; n_skin],
             shares: vec![0.0; n_skin],
@@ -118,13 +126,13 @@ impl LiveEnrichment {
     /// Copies the windows of another enrichment of the same model, for a change of examples during contact.
     pub fn adopt(&mut self, other: &Self) {
         self.tools.copy_from_slice(&other.tools);
-        self.least_confidence = other.least_confidence;
+        (self.least_confidence, self.written) = (other.least_confidence, other.written);
     }
 
     /// Forgets all contacts: the state was reset or restored.
     pub fn forget(&mut self) {
         self.tools.fill(ToolWindows::default());
-        self.least_confidence = Steady::default();
+        (self.least_confidence, self.written) = (Steady::default(), None);
     }
 
     /// Confidence in the detail of each tool, `[n_tools]`; 0 without contact. It follows the frame last written as fast as detail
@@ -140,16 +148,17 @@ impl LiveEnrichment {
 
     /// Moves the confidences on to this tick.
     fn steady_confidence(&mut self, tick: u64, step: f32) {
+        let is_watched = self.written.is_some_and(|frame| step * tick.saturating_sub(frame) as f32 <= 1.0);
         let mut least = Some(f32::INFINITY);
         for windows in &mut self.tools {
             let aim = windows.confidence_aim();
-            windows.confidence.approach(aim, tick, step);
+            windows.confidence.approach(aim, tick, step, is_watched);
             if windows.current.is_some() {
                 least = least.zip(aim).map(|(a, b)| a.min(b));
             }
         }
         let least = least.map(|c| if c.is_finite() { c } else { 0.0 });
-        self.least_confidence.approach(least, tick, step);
+        self.least_confidence.approach(least, tick, step, is_watched);
     }
 
     /// Follows the contacts of a tick. To be called after every tick; cheap.
@@ -182,6 +191,7 @@ impl LiveEnrichment {
     /// Writes the enriched skin, `[n_skin]` \[m\], world axes.
     pub fn write_skin(&mut self, model: &Model, state: &State, out: &mut [[f32; 3]]) {
         let n_windows = self.n_windows();
+        self.written = Some(state.tick());
         if n_windows == 0 {
             state.write_skin(model, out);
             return;
