@@ -67,6 +67,8 @@ struct Steady {
     value: f32,
     /// Tick to which it has moved.
     tick: u64,
+    /// Value and tick that it has moved from: what is known of a tick may change within it.
+    from: (f32, u64),
 }
 
 impl Steady {
@@ -79,9 +81,12 @@ impl Steady {
             }
             return;
         };
-        let most = step * tick.saturating_sub(self.tick) as f32;
-        self.value += (aim - self.value).clamp(-most, most);
-        self.tick = tick;
+        if tick != self.tick {
+            (self.from, self.tick) = ((self.value, self.tick), tick);
+        }
+        let (before, begin) = self.from;
+        let most = step * tick.saturating_sub(begin) as f32;
+        self.value = aim.clamp(before - most, before + most);
     }
 }
 
