@@ -7,12 +7,15 @@
 use plica_geometry::CLUSTER_SIZE;
 
 use super::V3;
-use super::solid::{NumberedVertex, Placement, Solid, nearest_on_segment, nearest_segments};
+use super::solid::{NumberedVertex, Placement, Segment, Solid, UNKNOWN_PLANE, nearest_on_segment, nearest_segments};
 use super::surface::SkinSurface;
 use crate::embedding::SkinPositions;
 
 /// Features closer than this share of an edge to its end are left to the end.
 const INTERIOR: f32 = 0.05;
+
+/// Gap from which a vertex has no weight in the contact point \[m\].
+pub(crate) const BAND: f32 = 1e-3;
 
 /// Assumed bound on the stretch of edges, before deformed lengths are computed.
 const STRETCH: f32 = 1.5;
@@ -62,6 +65,8 @@ pub(crate) struct Detector {
     near_clusters: Vec<u32>,
     /// Signed distance of each vertex of the near clusters; infinite elsewhere.
     distances: Vec<f32>,
+    /// Nearest plane of the same vertices, for a single polytope with many.
+    planes: Vec<u32>,
     candidates: Vec<Candidate>,
     /// Candidates beyond the capacity.
     pub(crate) overflow: u32,
@@ -75,6 +80,7 @@ impl Detector {
         Self {
             near_clusters: Vec::with_capacity(n_skin.div_ceil(CLUSTER_SIZE)),
             distances: vec![f32::INFINITY; n_skin],
+            planes: vec![UNKNOWN_PLANE; n_skin],
             candidates: Vec::with_capacity(CAPACITY),
             overflow: 0,
         }
@@ -143,12 +149,14 @@ impl Detector {
     }
 
     fn measure_vertices(&mut self, search: &Search<'_>) {
-        let Search { surface, skin, solid, placement, .. } = *search;
+        let Search { surface, skin, solid, placement, reach } = *search;
         for &cluster in &self.near_clusters {
             let first = cluster as usize * CLUSTER_SIZE;
             let last = (first + CLUSTER_SIZE).min(surface.rest.len());
             let [x, y, z] = skin.cluster(cluster as usize);
             let distances = &mut self.distances[first..last];
+            // Vertices this far away have no part in rows or contact points.
+            let margin = reach.max(BAND) + STRETCH * surface.longest_edge(cluster as usize);
             match solid {
                 Solid::Round { a, b, radius } => {
                     let (a, b) = (placement.to_world(*a), placement.to_world(*b));
@@ -162,9 +170,14 @@ impl Detector {
                     }
                 }
                 Solid::Polytopes(parts) => {
-                    for (lane, d) in distances.iter_mut().enumerate() {
+                    let planes = &mut self.planes[first..last];
+                    for (lane, (d, plane)) in distances.iter_mut().zip(planes).enumerate() {
                         let local = placement.to_local(V3::new(x[lane], y[lane], z[lane]));
-                        *d = parts.iter().map(|p| p.distance(&local).0).fold(f32::INFINITY, f32::min);
+                        let nearest = parts.iter().map(|p| p.nearest_within(&local, margin));
+                        let nearest =
+                            nearest.fold((f32::INFINITY, UNKNOWN_PLANE), |a, b| if b.0 < a.0 { b } else { a });
+                        *d = nearest.0;
+                        *plane = if parts.len() == 1 { nearest.1 } else { UNKNOWN_PLANE };
                     }
                 }
                 Solid::HalfSpace { normal } => {
@@ -183,6 +196,7 @@ impl Detector {
             let first = cluster as usize * CLUSTER_SIZE;
             let last = (first + CLUSTER_SIZE).min(self.distances.len());
             self.distances[first..last].fill(f32::INFINITY);
+            self.planes[first..last].fill(UNKNOWN_PLANE);
         }
     }
 
@@ -209,7 +223,7 @@ impl Detector {
     }
 
     fn edges(&mut self, search: &Search<'_>) {
-        let Search { surface, skin, solid, placement, reach } = *search;
+        let Search { surface, skin, reach, .. } = *search;
         for index in 0..self.near_clusters.len() {
             for &e in surface.edges_of_cluster(self.near_clusters[index] as usize) {
                 let [v0, v1] = surface.edges[e as usize].map(|v| v as usize);
@@ -222,7 +236,9 @@ impl Detector {
                 if sum - (q - p).norm() >= 2.0 * reach {
                     continue;
                 }
-                let Some((t, gap, normal)) = edge_minimum(solid, placement, &p, &q) else { continue };
+                let Some((t, gap, normal)) = edge_minimum(search, [p, q], [v0, v1].map(|v| self.planes[v])) else {
+                    continue;
+                };
                 if gap >= reach || !(INTERIOR..=1.0 - INTERIOR).contains(&t) {
                     continue;
                 }
@@ -335,17 +351,18 @@ fn vertex_normal(solid: &Solid, placement: &Placement, point: &V3) -> V3 {
 }
 
 /// Parameter, gap and normal where the distance along `p q` is smallest.
-fn edge_minimum(solid: &Solid, placement: &Placement, p: &V3, q: &V3) -> Option<(f32, f32, V3)> {
+fn edge_minimum(search: &Search<'_>, [p, q]: [V3; 2], planes: [u32; 2]) -> Option<(f32, f32, V3)> {
+    let Search { solid, placement, reach, .. } = *search;
     match solid {
         Solid::Round { a, b, radius } => {
             let (a, b) = (placement.to_world(*a), placement.to_world(*b));
-            let (t, s) = nearest_segments(p, q, &a, &b);
+            let (t, s) = nearest_segments(&p, &q, &a, &b);
             let apart = p + (q - p) * t - (a + (b - a) * s);
             Some((t, apart.norm() - radius, unit_or_up(apart)))
         }
         Solid::Polytopes(parts) => {
-            let (p, q) = (placement.to_local(*p), placement.to_local(*q));
-            let minima = parts.iter().filter_map(|part| part.distance_to_segment(&p, &q));
+            let segment = Segment { ends: [p, q].map(|end| placement.to_local(end)), planes, reach };
+            let minima = parts.iter().filter_map(|part| part.distance_to_segment(&segment));
             let (t, gap, normal) = minima.min_by(|a, b| a.1.total_cmp(&b.1))?;
             Some((t, gap, placement.rotation * normal))
         }

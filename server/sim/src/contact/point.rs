@@ -4,13 +4,10 @@
 //! the centroid of smooth contact weights, 1 at gap <= 0 and falling to 0 at 1 mm. Never a vertex: it jitters.
 
 use super::V3;
-use super::detect::{Detector, Search};
+use super::detect::{BAND, Detector, Search};
 use super::surface::SkinSurface;
 use crate::embedding::SkinPositions;
 use crate::smoothstep::smoothstep;
-
-/// Gap from which a vertex has no weight \[m\].
-const BAND: f32 = 1e-3;
 
 /// A contact point, deformed and on the reference skin \[m\].
 #[derive(Debug, Clone, Copy, PartialEq)]

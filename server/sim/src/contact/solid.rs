@@ -30,12 +30,27 @@ pub(crate) struct Polytope {
     first_vertex: usize,
     /// Farthest vertex from the origin \[m\].
     reach: f32,
+    /// Nearest plane and farthest vertex from the center \[m\].
+    radii: [f32; 2],
     /// Farthest vertex along -z \[m\], at least 0.
     tip: f32,
     /// Of `n . x - o` over the planes, and of `d . v` over the vertices, where there are many.
     plane_tree: Option<SupportTree>,
     vertex_tree: Option<SupportTree>,
 }
+
+/// Knowledge about a segment from before its search.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Segment {
+    pub(crate) ends: [V3; 2],
+    /// Nearest planes of the ends; [`UNKNOWN_PLANE`] otherwise.
+    pub(crate) planes: [u32; 2],
+    /// Distances from here on are of no interest \[m\].
+    pub(crate) reach: f32,
+}
+
+/// No plane is known.
+pub(crate) const UNKNOWN_PLANE: u32 = u32::MAX;
 
 /// A vertex of a polytope and its number among those of all parts.
 #[derive(Debug, Clone, Copy)]
@@ -164,6 +179,8 @@ impl Polytope {
         let support = |normal: &V3| vertices.iter().map(|v| normal.dot(v)).fold(f32::NEG_INFINITY, f32::max);
         let planes: Vec<_> = polytope.planes().iter().map(normal).map(|n| (n, support(&n))).collect();
         let center = vertices.iter().sum::<V3>() / vertices.len() as f32;
+        let inner = planes.iter().map(|(n, o)| o - n.dot(&center)).fold(f32::INFINITY, f32::min);
+        let outer = vertices.iter().map(|v| (v - center).norm()).fold(0.0, f32::max);
         let many = |functions: Vec<[f32; 4]>| (functions.len() > FEW).then(|| SupportTree::new(&functions));
         Self {
             reach: vertices.iter().map(|p| p.norm()).fold(0.0, f32::max),
@@ -172,9 +189,24 @@ impl Polytope {
             vertex_tree: many(vertices.iter().map(|v| [v.x, v.y, v.z, 0.0]).collect()),
             planes,
             vertices,
+            radii: [inner, outer],
             center,
             first_vertex,
         }
+    }
+
+    /// Nearest plane of a point and its signed distance, where a cheap bound leaves it below `margin`; the bound otherwise. Without
+    /// many planes the exact distance is the cheapest.
+    ///
+    /// Planes shifted out by `s` lie within the shape scaled by `1 + s / r` about a center that is `r` below the nearest plane.
+    pub(crate) fn nearest_within(&self, p: &V3, margin: f32) -> (f32, u32) {
+        let [inner, outer] = self.radii;
+        let bound = inner * ((p - self.center).norm() / outer - 1.0);
+        if self.plane_tree.is_some() && bound > margin {
+            return (bound, UNKNOWN_PLANE);
+        }
+        let (distance, plane) = self.nearest_plane(p);
+        (distance, if self.plane_tree.is_some() { plane as u32 } else { UNKNOWN_PLANE })
     }
 
     /// Signed distance and outward normal of the nearest face; mitred outside edges, exact on and inside the surface.
@@ -242,20 +274,26 @@ impl Polytope {
 
     /// Smallest signed distance inside the segment `p q`, where it lies strictly between the ends: parameter, distance and
     /// the normal that is orthogonal to the segment. The distance is a maximum of linear functions along the segment.
-    pub(crate) fn distance_to_segment(&self, p: &V3, q: &V3) -> Option<(f32, f32, V3)> {
-        let line = |t: f32| {
-            let (_, plane) = self.nearest_plane(&(p + (q - p) * t));
+    pub(crate) fn distance_to_segment(&self, segment: &Segment) -> Option<(f32, f32, V3)> {
+        let [p, q] = &segment.ends;
+        let line = |t: f32, known: u32| {
+            let nearest = || self.nearest_plane(&(p + (q - p) * t)).1;
+            let plane = if known == UNKNOWN_PLANE { nearest() } else { known as usize };
             let (normal, offset) = self.planes.get(plane).copied().unwrap_or((V3::z(), 0.0));
             (normal.dot(p) - offset, normal.dot(&(q - p)), normal)
         };
-        let (mut falling, mut rising) = (line(0.0), line(1.0));
+        let (mut falling, mut rising) = (line(0.0, segment.planes[0]), line(1.0, segment.planes[1]));
         if falling.1 >= 0.0 || rising.1 <= 0.0 {
             return None;
         }
         let mut t = 0.0;
         for _ in 0..16 {
             t = (falling.0 - rising.0) / (rising.1 - falling.1);
-            let middle = line(t);
+            // Below the crossing of two of its lines the distance does not come.
+            if self.plane_tree.is_some() && falling.0 + falling.1 * t >= segment.reach {
+                return None;
+            }
+            let middle = line(t, UNKNOWN_PLANE);
             let is_vertex = middle.0 + middle.1 * t <= falling.0 + falling.1 * t + 1e-9;
             if is_vertex || middle.1 == 0.0 {
                 break;
@@ -347,7 +385,21 @@ mod tests {
             assert_eq!(tree.nearest_plane(p), all.nearest_plane(p), "{p}");
         }
         for pair in points.windows(2) {
-            assert_eq!(tree.distance_to_segment(&pair[0], &pair[1]), all.distance_to_segment(&pair[0], &pair[1]));
+            let unknown = [UNKNOWN_PLANE; 2];
+            let segment = Segment { ends: [pair[0], pair[1]], planes: unknown, reach: f32::INFINITY };
+            let expected = all.distance_to_segment(&segment);
+            assert_eq!(tree.distance_to_segment(&segment), expected);
+            // What is known from the ends changes nothing, and only distances beyond the reach are left out.
+            let planes = segment.ends.map(|end| tree.nearest_within(&end, f32::INFINITY).1);
+            let near = tree.distance_to_segment(&Segment { planes, reach: 1e-3, ..segment });
+            match expected.filter(|(_, distance, _)| *distance < 1e-3) {
+                Some((_, distance, _)) => assert!((near.unwrap().1 - distance).abs() < 1e-7),
+                None => assert!(near.is_none_or(|(_, distance, _)| distance >= 1e-3 - 1e-7)),
+            }
+        }
+        for p in &points {
+            let (bound, exact) = (tree.nearest_within(p, 2e-3).0, all.distance(p).0);
+            assert!(bound == exact || bound > 2e-3 && bound <= exact + 1e-7, "{bound} of {exact}");
         }
         let bounds = |part: &Polytope| Solid::Polytopes(vec![part.clone()]).bounds(&placement);
         assert_eq!(bounds(&tree), bounds(&all));
