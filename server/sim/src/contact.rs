@@ -1,12 +1,12 @@
 //! Frictional contact between the skin and tools or planes, imposed inside the implicit solve.
 //!
 //! [`solid`] knows shapes ([`support_tree`] those of many faces), [`detect`] finds skin points near them, [`rows`] turns them into constraint rows that keep their
-//! multipliers across ticks, [`law`] is the contact and friction law, [`proxy`] the coupled tools, [`coupling`] the
+//! multipliers across ticks, [`friction_law`] is the contact and friction law, [`proxy`] the coupled tools, [`coupling`] the
 //! contact operator of the linear solver, [`point`] the contact point on the reference skin.
 
 mod coupling;
 mod detect;
-mod law;
+mod friction_law;
 mod point;
 mod proxy;
 mod rows;
@@ -16,7 +16,7 @@ mod surface;
 
 pub(crate) use coupling::ContactCoupling;
 pub(crate) use detect::{Detector, Search};
-pub(crate) use law::{evaluate, predict_secant, settle, stack_forces};
+pub(crate) use friction_law::{evaluate, predict_secant, settle, stack_forces};
 pub(crate) use point::{ContactPoint, contact_point};
 pub(crate) use proxy::{Proxy, ProxyMotion, at_arm};
 pub(crate) use rows::{Contact, Rows, Selection};
