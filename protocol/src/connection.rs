@@ -135,7 +135,7 @@ mod tests {
 
     #[test]
     fn faults_of_a_configuration_are_told_without_the_text_of_a_library() {
-        let at = "at /root/.cargo/registry/src/zenoh-config-1.10.2/src/lib.rs:1484.";
+        let at = "at /home/user/.cargo/zenoh-config-1.10.2/src/lib.rs:1484.";
         let message = |msg: &str| {
             format!("JSON error: Message {{ msg: \"{msg}\", location: Some(Location {{ line: 4, column: 17 }}) }} {at}")
         };
@@ -143,7 +143,7 @@ mod tests {
             (message("unknown field `nokey`, expected one of `id`, `mode`"), "4: unknown key `nokey`"),
             (message("invalid type: string \\\"a\\\", expected u64"), "4: invalid type: string \"a\", expected u64"),
             (
-                message("Endpoints must be of the form <protocol>/<address>: x at /root/a.rs:1."),
+                message("Endpoints must be of the form <protocol>/<address>: x at /home/user/a.rs:1."),
                 "4: an endpoint is not",
             ),
             (format!("JSON error:  --> 2:3\n  |\n2 | {{ bad\n  = expected array {at}"), "2: not valid JSON5"),
