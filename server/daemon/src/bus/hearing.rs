@@ -24,7 +24,7 @@ const PERIOD: Duration = Duration::from_millis(500);
 /// Longest wait for the end of an own query.
 const PATIENCE: Duration = Duration::from_millis(400);
 /// Periods without an answer after which the bus counts as deaf; a little more, as the last query has just been put.
-const SILENT_MS: u64 = 3 * 500 + 150;
+const SILENT_MS: u64 = 3 * PERIOD.as_millis() as u64 + 150;
 /// A judge that looks less often than this was not running itself, and excuses the gap.
 const LONGEST_GAP_MS: u64 = 400;
 /// Between two warnings about another daemon.
@@ -106,21 +106,24 @@ fn run(shared: &Shared, hearing: &Hearing) {
             Some(other) => {
                 hearing.answered_ms.store(hearing.now_ms(), Relaxed);
                 if let Some(other) = other {
-                    shared.counters.count(OTHER_DAEMON);
-                    if reminded.is_none_or(|at| at.elapsed() > REMIND) {
-                        tracing::warn!(
-                            "{}; clients cannot tell the two apart: stop one, or give it another --session",
-                            describe(&other, shared.keys.root())
-                        );
-                        reminded = Some(Instant::now());
-                    }
+                    note(shared, &other, &mut reminded);
                 }
             }
-            None => tracing::error!("an own query got no answer from the bus"),
+            None => tracing::error!("the bus did not answer a query of its own daemon"),
         }
         while Instant::now() < due && !shared.stopping() {
             std::thread::park_timeout(due.saturating_duration_since(Instant::now()));
         }
+    }
+}
+
+/// Counts another daemon of this session, and warns of it now and then.
+fn note(shared: &Shared, other: &Status, reminded: &mut Option<Instant>) {
+    shared.counters.count(OTHER_DAEMON);
+    if reminded.is_none_or(|at| at.elapsed() > REMIND) {
+        let other = describe(other, shared.keys.root());
+        tracing::warn!("{other}; clients cannot tell the two apart: stop one, or give it another --session");
+        *reminded = Some(Instant::now());
     }
 }
 
