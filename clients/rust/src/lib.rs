@@ -24,6 +24,7 @@ mod jobs;
 pub mod mesh;
 mod options;
 pub mod pattern;
+pub mod pose_file;
 mod publish;
 mod query;
 mod queue;

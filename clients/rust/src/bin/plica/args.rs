@@ -6,9 +6,10 @@ use std::path::PathBuf;
 
 use clap::{ArgGroup, Parser, Subcommand, ValueEnum};
 use plica_client::pattern::Pattern;
+use plica_client::pose_file::PoseFileArgs;
 use plica_client::protocol::{DEFAULT_ENDPOINT, DEFAULT_SESSION};
 use plica_client::{Client, ClientError, ClientOptions};
-use plica_trajectory::{FIT_HELP, OnBadRow, QuaternionOrder, ReadOptions, TimeUnit};
+use plica_trajectory::FIT_HELP;
 
 /// Queries, drives, records and replays a running plicad.
 #[derive(Debug, Parser)]
@@ -132,72 +133,12 @@ pub(crate) struct Probe {
     #[arg(long, conflicts_with_all = ["pattern", "rate_hz", "seconds"])]
     pub(crate) poses: Option<PathBuf>,
     #[command(flatten)]
-    pub(crate) reading: PoseFile,
+    pub(crate) reading: PoseFileArgs,
     /// Plays a trajectory of more than an hour.
     #[arg(long, requires = "poses")]
     pub(crate) no_limits: bool,
     #[arg(long, requires = "poses", help = FIT_HELP)]
     pub(crate) fit: bool,
-}
-
-/// How a pose file is read: docs/poses.md.
-#[derive(Debug, clap::Args)]
-pub(crate) struct PoseFile {
-    /// Unit of the file's times [default: recognised by a plausible rate].
-    #[arg(long, value_enum, value_name = "UNIT", requires = "poses")]
-    pub(crate) time_unit: Option<TimeUnitName>,
-    /// Order of quaternion components in the file [default: xyzw, or as the header names them].
-    #[arg(long, value_enum, value_name = "ORDER", requires = "poses")]
-    pub(crate) quaternion_order: Option<QuaternionOrderName>,
-    /// Rows that cannot be played (NaN, tool out of sight, times that repeat or go back) refuse the file, or are left out and counted.
-    #[arg(long, value_enum, default_value_t, value_name = "POLICY")]
-    pub(crate) on_bad_row: OnBadRowName,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(crate) enum TimeUnitName {
-    S,
-    Ms,
-    Us,
-    Ns,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(crate) enum QuaternionOrderName {
-    /// w last.
-    Xyzw,
-    /// w first.
-    Wxyz,
-}
-
-#[derive(Debug, Clone, Copy, Default, ValueEnum)]
-pub(crate) enum OnBadRowName {
-    /// The file is refused, with the line.
-    #[default]
-    Error,
-    /// They are left out and counted; the tool stays where it was.
-    Skip,
-}
-
-impl PoseFile {
-    pub(crate) fn options(&self) -> ReadOptions {
-        ReadOptions {
-            time_unit: self.time_unit.map(|unit| match unit {
-                TimeUnitName::S => TimeUnit::Seconds,
-                TimeUnitName::Ms => TimeUnit::Milliseconds,
-                TimeUnitName::Us => TimeUnit::Microseconds,
-                TimeUnitName::Ns => TimeUnit::Nanoseconds,
-            }),
-            quaternion_order: self.quaternion_order.map(|order| match order {
-                QuaternionOrderName::Xyzw => QuaternionOrder::Xyzw,
-                QuaternionOrderName::Wxyz => QuaternionOrder::Wxyz,
-            }),
-            on_bad_row: match self.on_bad_row {
-                OnBadRowName::Error => OnBadRow::Error,
-                OnBadRowName::Skip => OnBadRow::Skip,
-            },
-        }
-    }
 }
 
 #[derive(Debug, clap::Args)]
