@@ -9,11 +9,12 @@ mod common;
 use std::sync::Arc;
 
 use common::examples::{RADIUS, examples, presses};
-use common::{E, Run, Scene, ball, top, top_normal};
+use common::{E, Run, Scene, ball, tool, top, top_normal};
 use divan::Bencher;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
+use plica_geometry::ConvexPolytope;
 use plica_sim::enrichment::{DEFAULT_METHOD, Enricher, EnrichmentOptions, LiveEnrichment};
-use plica_sim::kernels;
+use plica_sim::{ToolShape, kernels};
 
 fn main() {
     divan::main();
@@ -36,10 +37,22 @@ fn settle(scene: Scene) -> Run {
     run
 }
 
-#[divan::bench]
-fn contact(bencher: Bencher) {
-    let Run { model, state, mut workspace, .. } = pressed();
+/// The rows of a ball, or of the hull of that number of points on it.
+#[divan::bench(args = [0, 50, 642, 2562])]
+fn contact(bencher: Bencher, hull_points: usize) {
+    let tool = if hull_points == 0 { ball(RADIUS) } else { tool("hull", hull_of_a_ball(hull_points)) };
+    let Run { model, state, mut workspace, .. } = settle(Scene::wedge(E, 0.45).tool(tool));
     bencher.bench_local(|| kernels::find_contacts(&model, &state, &mut workspace));
+}
+
+/// Points on the ball by the golden angle.
+fn hull_of_a_ball(n: usize) -> ToolShape {
+    let point = |i: usize| {
+        let z = 1.0 - (2 * i + 1) as f64 / n as f64;
+        let (sin, cos) = (2.399_963_229_728_653 * i as f64).sin_cos();
+        Point3::from(Vector3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z) * RADIUS)
+    };
+    ToolShape::ConvexHull { polytope: ConvexPolytope::hull((0..n).map(point).collect()).unwrap() }
 }
 
 #[divan::bench]

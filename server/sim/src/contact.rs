@@ -1,18 +1,20 @@
 //! Frictional contact between the skin and tools or planes, imposed inside the implicit solve.
 //!
-//! [`solid`] knows shapes ([`support_tree`] those of many faces), [`detect`] finds skin points near them, [`rows`] turns them into constraint rows that keep their
-//! multipliers across ticks, [`friction_law`] is the contact and friction law, [`proxy`] the coupled tools, [`coupling`] the
-//! contact operator of the linear solver, [`point`] the contact point on the reference skin.
+//! [`solid`] knows shapes ([`plane_octree`] and [`vertex_graph`] those of many faces), [`detect`] finds skin points near them,
+//! [`rows`] turns them into constraint rows that keep their multipliers across ticks, [`friction_law`] is the contact and
+//! friction law, [`proxy`] the coupled tools, [`coupling`] the contact operator of the linear solver, [`point`] the contact
+//! point on the reference skin.
 
 mod coupling;
 mod detect;
 mod friction_law;
+mod plane_octree;
 mod point;
 mod proxy;
 mod rows;
 mod solid;
-mod support_tree;
 mod surface;
+mod vertex_graph;
 
 pub(crate) use coupling::ContactCoupling;
 pub(crate) use detect::{Detector, Search};

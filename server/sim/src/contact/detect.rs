@@ -278,10 +278,10 @@ impl Detector {
                     Solid::Polytopes(parts) => {
                         for part in parts {
                             let center = placement.to_world(part.center);
-                            part.vertices_below(placement, &corners, reach, |vertex| {
+                            let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).normalize();
+                            part.vertices_facing(placement, &corners, |vertex| {
                                 let NumberedVertex { position, number } = vertex;
-                                let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-                                let depth = (center - position).dot(&normal) / normal.norm();
+                                let depth = (center - position).dot(&normal);
                                 if depth > 0.0 {
                                     let point = ToolPoint { position, radius: 0.0, depth, number };
                                     self.under_tool_point(search, t, &corners, &point);

@@ -2,12 +2,16 @@
 
 use plica_geometry::{ConvexPolytope, FacePlane};
 
-use super::support_tree::SupportTree;
+use super::plane_octree::{Nearest, Plane, PlaneOctree, nearest_of};
+use super::vertex_graph::VertexGraph;
 use super::{M3, V3};
 use crate::description::ToolShape;
 
 /// Up to this number of planes or vertices a loop over all of them is cheapest.
-const FEW: usize = 64;
+const FEW: usize = 32;
+
+/// Slope by which a triangle is tilted to find further vertices that press on it.
+const TILT: f32 = 0.1;
 
 /// A shape in its own frame.
 #[derive(Debug, Clone)]
@@ -23,7 +27,7 @@ pub(crate) enum Solid {
 /// Intersection of half-spaces `normal . x <= offset`.
 #[derive(Debug, Clone)]
 pub(crate) struct Polytope {
-    planes: Vec<(V3, f32)>,
+    planes: Vec<Plane>,
     vertices: Vec<V3>,
     pub(crate) center: V3,
     /// Vertices of the parts before this one.
@@ -34,9 +38,9 @@ pub(crate) struct Polytope {
     radii: [f32; 2],
     /// Farthest vertex along -z \[m\], at least 0.
     tip: f32,
-    /// Of `n . x - o` over the planes, and of `d . v` over the vertices, where there are many.
-    plane_tree: Option<SupportTree>,
-    vertex_tree: Option<SupportTree>,
+    /// Where there are many.
+    plane_octree: Option<PlaneOctree>,
+    vertex_graph: Option<VertexGraph>,
 }
 
 /// Knowledge about a segment from before its search.
@@ -47,6 +51,20 @@ pub(crate) struct Segment {
     pub(crate) planes: [u32; 2],
     /// Distances from here on are of no interest \[m\].
     pub(crate) reach: f32,
+}
+
+/// Signed distance from a plane along a segment, `start + slope t`.
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    start: f32,
+    slope: f32,
+    plane: u32,
+}
+
+impl Line {
+    fn at(self, t: f32) -> f32 {
+        self.start + self.slope * t
+    }
 }
 
 /// No plane is known.
@@ -121,9 +139,9 @@ impl Solid {
             Self::Round { a, b, radius } => [a, b].into_iter().for_each(|p| extend(*p, *radius)),
             Self::Polytopes(parts) => {
                 for part in parts {
-                    match &part.vertex_tree {
+                    match &part.vertex_graph {
                         None => part.vertices.iter().for_each(|p| extend(*p, 0.0)),
-                        Some(tree) => part.extremes(tree, placement).into_iter().for_each(|p| extend(p, 0.0)),
+                        Some(graph) => part.extremes(graph, placement).into_iter().for_each(|p| extend(p, 0.0)),
                     }
                 }
             }
@@ -177,16 +195,18 @@ impl Polytope {
             triangle_normal(&a, &b, &c).unwrap_or(face.normal.cast())
         };
         let support = |normal: &V3| vertices.iter().map(|v| normal.dot(v)).fold(f32::NEG_INFINITY, f32::max);
-        let planes: Vec<_> = polytope.planes().iter().map(normal).map(|n| (n, support(&n))).collect();
+        let plane = |normal: V3| Plane { normal, offset: support(&normal) };
+        let planes: Vec<_> = polytope.planes().iter().map(normal).map(plane).collect();
         let center = vertices.iter().sum::<V3>() / vertices.len() as f32;
-        let inner = planes.iter().map(|(n, o)| o - n.dot(&center)).fold(f32::INFINITY, f32::min);
+        let inner = planes.iter().map(|plane| -plane.distance(&center)).fold(f32::INFINITY, f32::min);
         let outer = vertices.iter().map(|v| (v - center).norm()).fold(0.0, f32::max);
-        let many = |functions: Vec<[f32; 4]>| (functions.len() > FEW).then(|| SupportTree::new(&functions));
+        let low = vertices.iter().fold(V3::repeat(f32::INFINITY), |low, v| low.inf(v));
+        let high = vertices.iter().fold(V3::repeat(f32::NEG_INFINITY), |high, v| high.sup(v));
         Self {
             reach: vertices.iter().map(|p| p.norm()).fold(0.0, f32::max),
             tip: vertices.iter().map(|v| -v.z).fold(0.0, f32::max),
-            plane_tree: many(planes.iter().map(|(n, o)| [n.x, n.y, n.z, -o]).collect()),
-            vertex_tree: many(vertices.iter().map(|v| [v.x, v.y, v.z, 0.0]).collect()),
+            plane_octree: (planes.len() > FEW).then(|| PlaneOctree::new(&planes, &low, &high)),
+            vertex_graph: (vertices.len() > FEW).then(|| VertexGraph::new(&vertices, polytope.triangles())),
             planes,
             vertices,
             radii: [inner, outer],
@@ -202,106 +222,99 @@ impl Polytope {
     pub(crate) fn nearest_within(&self, p: &V3, margin: f32) -> (f32, u32) {
         let [inner, outer] = self.radii;
         let bound = inner * ((p - self.center).norm() / outer - 1.0);
-        if self.plane_tree.is_some() && bound > margin {
+        if self.plane_octree.is_some() && bound > margin {
             return (bound, UNKNOWN_PLANE);
         }
-        let (distance, plane) = self.nearest_plane(p);
-        (distance, if self.plane_tree.is_some() { plane as u32 } else { UNKNOWN_PLANE })
+        let nearest = self.nearest_plane(p);
+        (nearest.distance, if self.plane_octree.is_some() { nearest.plane } else { UNKNOWN_PLANE })
     }
 
     /// Signed distance and outward normal of the nearest face; mitred outside edges, exact on and inside the surface.
     pub(crate) fn distance(&self, p: &V3) -> (f32, V3) {
-        let (distance, plane) = self.nearest_plane(p);
-        (distance, self.planes.get(plane).map_or(V3::z(), |plane| plane.0))
+        let nearest = self.nearest_plane(p);
+        (nearest.distance, self.planes.get(nearest.plane as usize).map_or(V3::z(), |plane| plane.normal))
     }
 
     /// Largest signed distance to a plane, and which; the first of equal ones.
-    fn nearest_plane(&self, p: &V3) -> (f32, usize) {
-        let signed = |(normal, offset): &(V3, f32)| normal.dot(p) - offset;
-        if let Some(tree) = &self.plane_tree {
-            let nearest = tree.largest([p.x, p.y, p.z, 1.0], |plane| signed(&self.planes[plane as usize]));
-            return (nearest.value, nearest.index as usize);
+    fn nearest_plane(&self, p: &V3) -> Nearest {
+        match &self.plane_octree {
+            Some(octree) => octree.nearest(&self.planes, p),
+            None => nearest_of(&self.planes, 0..self.planes.len() as u32, p),
         }
-        let mut best = (f32::NEG_INFINITY, usize::MAX);
-        for (index, plane) in self.planes.iter().enumerate() {
-            let d = signed(plane);
-            if d > best.0 {
-                best = (d, index);
-            }
-        }
-        best
     }
 
     /// Vertices that lie farthest along and against each axis of the world.
-    fn extremes(&self, tree: &SupportTree, placement: &Placement) -> [V3; 6] {
+    fn extremes(&self, graph: &VertexGraph, placement: &Placement) -> [V3; 6] {
         std::array::from_fn(|k| {
             let axis = V3::ith(k / 2, if k % 2 == 0 { 1.0 } else { -1.0 });
             let d = placement.rotation.tr_mul(&axis);
-            self.vertices[tree.largest([d.x, d.y, d.z, 0.0], |v| d.dot(&self.vertices[v as usize])).index as usize]
+            self.vertices[graph.farthest(&self.vertices, &d) as usize]
         })
     }
 
-    /// Calls `visit` with the vertices, in the frame of the world, that may lie in the prism below `corners`: of many, those on
-    /// the inner side of the triangle's edges and below `reach` above its plane, and some more.
-    pub(crate) fn vertices_below(
+    /// Calls `visit` with the vertices, in the frame of the world, that may press on the triangle `corners`. Of few vertices these
+    /// are all. Of many, the one that lies deepest below the triangle and those that lie deepest once it is tilted towards each of its
+    /// corners: the distance is convex, so over the inside of the triangle it is smallest under the first, and the others
+    /// keep a flat side from rocking on one point.
+    pub(crate) fn vertices_facing(
         &self,
         placement: &Placement,
         corners: &[V3; 3],
-        reach: f32,
         mut visit: impl FnMut(NumberedVertex),
     ) {
-        let mut tell = |vertex: usize| {
-            let position = placement.to_world(self.vertices[vertex]);
-            visit(NumberedVertex { position, number: self.first_vertex + vertex });
+        let mut tell = |number: u32| {
+            let position = placement.to_world(self.vertices[number as usize]);
+            visit(NumberedVertex { position, number: self.first_vertex + number as usize });
         };
-        let Some(tree) = &self.vertex_tree else { return (0..self.vertices.len()).for_each(tell) };
-        let [a, b, c] = corners.map(|corner| placement.to_local(corner));
-        let Some(normal) = triangle_normal(&a, &b, &c) else { return };
-        // A vertex is wanted where each of these planes has it on its inner side, within rounding.
-        let slack = 1e-4 * ((b - a).norm() + (c - b).norm() + (a - c).norm());
-        let inner = |p: &V3, q: &V3| {
-            let across = normal.cross(&(q - p)).normalize();
-            (across, across.dot(p) - slack)
-        };
-        let planes = [inner(&a, &b), inner(&b, &c), inner(&c, &a), (-normal, -normal.dot(&a) - reach - slack)];
-        let is_wanted = |lower: &[f32; 4], upper: &[f32; 4]| {
-            planes
-                .iter()
-                .all(|(d, least)| (0..3).map(|k| (lower[k] * d[k]).max(upper[k] * d[k])).sum::<f32>() >= *least)
-        };
-        tree.visit(is_wanted, |vertex| tell(vertex as usize));
+        let Some(graph) = &self.vertex_graph else { return (0..self.vertices.len() as u32).for_each(tell) };
+        let local = corners.map(|corner| placement.to_local(corner));
+        let Some(normal) = triangle_normal(&local[0], &local[1], &local[2]) else { return };
+        let deepest = graph.farthest(&self.vertices, &-normal);
+        tell(deepest);
+        let middle = (local[0] + local[1] + local[2]) / 3.0;
+        let mut told = [deepest; 4];
+        for (k, corner) in local.iter().enumerate() {
+            let Some(towards) = (corner - middle).try_normalize(0.0) else { return };
+            let found = graph.farthest_from(&self.vertices, &(towards * TILT - normal), deepest);
+            if !told[..=k].contains(&found) {
+                tell(found);
+            }
+            told[k + 1] = found;
+        }
     }
 
     /// Smallest signed distance inside the segment `p q`, where it lies strictly between the ends: parameter, distance and
     /// the normal that is orthogonal to the segment. The distance is a maximum of linear functions along the segment.
     pub(crate) fn distance_to_segment(&self, segment: &Segment) -> Option<(f32, f32, V3)> {
         let [p, q] = &segment.ends;
-        let line = |t: f32, known: u32| {
-            let nearest = || self.nearest_plane(&(p + (q - p) * t)).1;
-            let plane = if known == UNKNOWN_PLANE { nearest() } else { known as usize };
-            let (normal, offset) = self.planes.get(plane).copied().unwrap_or((V3::z(), 0.0));
-            (normal.dot(p) - offset, normal.dot(&(q - p)), normal)
+        let along = |plane: u32| {
+            let Plane { normal, offset } = self.planes[plane as usize];
+            Line { start: normal.dot(p) - offset, slope: normal.dot(&(q - p)), plane }
         };
-        let (mut falling, mut rising) = (line(0.0, segment.planes[0]), line(1.0, segment.planes[1]));
-        if falling.1 >= 0.0 || rising.1 <= 0.0 {
+        let [falling, rising] = [0, 1].map(|end| match segment.planes[end] {
+            UNKNOWN_PLANE => self.nearest_plane(&segment.ends[end]).plane,
+            known => known,
+        });
+        let (mut falling, mut rising) = (along(falling), along(rising));
+        if falling.slope >= 0.0 || rising.slope <= 0.0 {
             return None;
         }
         let mut t = 0.0;
         for _ in 0..16 {
-            t = (falling.0 - rising.0) / (rising.1 - falling.1);
+            t = (falling.start - rising.start) / (rising.slope - falling.slope);
             // Below the crossing of two of its lines the distance does not come.
-            if self.plane_tree.is_some() && falling.0 + falling.1 * t >= segment.reach {
+            if self.plane_octree.is_some() && falling.at(t) >= segment.reach {
                 return None;
             }
-            let middle = line(t, UNKNOWN_PLANE);
-            let is_vertex = middle.0 + middle.1 * t <= falling.0 + falling.1 * t + 1e-9;
-            if is_vertex || middle.1 == 0.0 {
+            let middle = along(self.nearest_plane(&(p + (q - p) * t)).plane);
+            if middle.at(t) <= falling.at(t) + 1e-9 || middle.slope == 0.0 {
                 break;
             }
-            if middle.1 < 0.0 { falling = middle } else { rising = middle }
+            if middle.slope < 0.0 { falling = middle } else { rising = middle }
         }
-        let normal = falling.2 * rising.1 - rising.2 * falling.1;
-        (t > 0.0 && t < 1.0).then(|| (t, falling.0 + falling.1 * t, normal.normalize()))
+        let [below, above] = [falling, rising].map(|line| self.planes[line.plane as usize].normal);
+        let normal = below * rising.slope - above * falling.slope;
+        (t > 0.0 && t < 1.0).then(|| (t, falling.at(t), normal.normalize()))
     }
 }
 
@@ -372,53 +385,49 @@ mod tests {
     }
 
     #[test]
-    fn a_tree_of_planes_and_vertices_gives_what_asking_all_of_them_gives() {
+    fn many_planes_and_vertices_give_what_asking_all_of_them_gives() {
         let hull = ConvexPolytope::hull(sphere(2562, 0.01)).unwrap();
-        let tree = Polytope::new(&hull, 0);
-        assert!(tree.plane_tree.is_some() && tree.vertex_tree.is_some());
-        let all = Polytope { plane_tree: None, vertex_tree: None, ..tree.clone() };
+        let many = Polytope::new(&hull, 0);
+        assert!(many.plane_octree.is_some() && many.vertex_graph.is_some());
+        let all = Polytope { plane_octree: None, vertex_graph: None, ..many.clone() };
         let turn = nalgebra::Rotation3::from_euler_angles(0.3, -0.7, 1.1).into_inner();
         let placement = Placement { rotation: turn, origin: V3::new(0.1, -0.2, 0.05) };
         let points = [0.0, 0.002, 0.0099, 0.01, 0.0101, 0.02, 0.3].iter().flat_map(|r| sphere(300, *r));
         let points: Vec<V3> = points.map(|p| p.coords.cast()).collect();
         for p in &points {
-            assert_eq!(tree.nearest_plane(p), all.nearest_plane(p), "{p}");
+            assert_eq!(many.nearest_plane(p), all.nearest_plane(p), "{p}");
         }
         for pair in points.windows(2) {
             let unknown = [UNKNOWN_PLANE; 2];
             let segment = Segment { ends: [pair[0], pair[1]], planes: unknown, reach: f32::INFINITY };
             let expected = all.distance_to_segment(&segment);
-            assert_eq!(tree.distance_to_segment(&segment), expected);
+            assert_eq!(many.distance_to_segment(&segment), expected);
             // What is known from the ends changes nothing, and only distances beyond the reach are left out.
-            let planes = segment.ends.map(|end| tree.nearest_within(&end, f32::INFINITY).1);
-            let near = tree.distance_to_segment(&Segment { planes, reach: 1e-3, ..segment });
+            let planes = segment.ends.map(|end| many.nearest_within(&end, f32::INFINITY).1);
+            let near = many.distance_to_segment(&Segment { planes, reach: 1e-3, ..segment });
             match expected.filter(|(_, distance, _)| *distance < 1e-3) {
                 Some((_, distance, _)) => assert!((near.unwrap().1 - distance).abs() < 1e-7),
                 None => assert!(near.is_none_or(|(_, distance, _)| distance >= 1e-3 - 1e-7)),
             }
         }
         for p in &points {
-            let (bound, exact) = (tree.nearest_within(p, 2e-3).0, all.distance(p).0);
+            let (bound, exact) = (many.nearest_within(p, 2e-3).0, all.distance(p).0);
             assert!(bound == exact || bound > 2e-3 && bound <= exact + 1e-7, "{bound} of {exact}");
         }
         let bounds = |part: &Polytope| Solid::Polytopes(vec![part.clone()]).bounds(&placement);
-        assert_eq!(bounds(&tree), bounds(&all));
-        // No vertex in the prism below a triangle is left out.
+        for (found, expected) in bounds(&many).iter().zip(bounds(&all)) {
+            assert!((found - expected).norm() < 1e-7);
+        }
+        // The deepest vertex below a triangle is found.
         for corners in points.chunks_exact(3) {
             let corners = [corners[0], corners[1], corners[2]].map(|p| placement.to_world(p));
-            let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-            let is_below = |v: &NumberedVertex| {
-                let inside = (0..3)
-                    .all(|k| normal.cross(&(corners[(k + 1) % 3] - corners[k])).dot(&(v.position - corners[k])) >= 0.0);
-                inside && normal.normalize().dot(&(v.position - corners[0])) < 1e-3
+            let Some(normal) = triangle_normal(&corners[0], &corners[1], &corners[2]) else { continue };
+            let lowest = |part: &Polytope| {
+                let mut lowest = f32::INFINITY;
+                part.vertices_facing(&placement, &corners, |v| lowest = lowest.min(normal.dot(&v.position)));
+                lowest
             };
-            let found = |part: &Polytope| {
-                let mut numbers = Vec::new();
-                part.vertices_below(&placement, &corners, 1e-3, |v| numbers.extend(is_below(&v).then_some(v.number)));
-                numbers.sort_unstable();
-                numbers
-            };
-            assert_eq!(found(&tree), found(&all));
+            assert!((lowest(&many) - lowest(&all)).abs() < 1e-7);
         }
     }
 
