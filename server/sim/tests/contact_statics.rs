@@ -117,6 +117,69 @@ fn flat_faces_and_edges_settle_on_the_triangles() {
     }
 }
 
+/// Points of the golden spiral on the unit sphere.
+fn golden_spiral(n: usize) -> impl Iterator<Item = Vector3<f64>> {
+    (0..n).map(move |i| {
+        let z = 1.0 - (2 * i + 1) as f64 / n as f64;
+        let (sin, cos) = (2.399_963_229_728_653 * i as f64).sin_cos();
+        Vector3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
+    })
+}
+
+#[test]
+fn a_hull_of_thousands_of_points_presses_as_the_ball_that_it_approximates() {
+    let (radius, depth) = (0.010, 0.005);
+    let polytope = ConvexPolytope::hull(golden_spiral(2562).map(|p| Point3::from(p * radius)).collect()).unwrap();
+    let center = pressed(0.05, 0.03, radius, depth);
+    let press = |shape: ToolShape| {
+        let mut run = Scene::wedge(E, 0.45).tool(tool("t", shape)).run();
+        press_and_hold(&mut run, at(center), depth, 2.0);
+        run
+    };
+    let (ball, hull) = (press(ToolShape::Ball { radius_m: radius }), press(ToolShape::ConvexHull { polytope }));
+    let penetration = hull.ball_penetration(center, radius);
+    let force_error = (hull.force() - ball.force()).norm() / ball.force().norm();
+    let skin_error = hull.skin().iter().zip(ball.skin()).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    println!(
+        "hull: force {:.3} % off, skin {:.4} mm, into the ball {:.4} mm",
+        100.0 * force_error,
+        1e3 * skin_error,
+        1e3 * penetration
+    );
+    assert!(force_error < 0.01 && skin_error < 0.1e-3 && penetration < 0.05e-3);
+    assert_balanced(&hull, "hull");
+}
+
+#[test]
+fn a_rounded_block_of_many_vertices_rests_flat_on_its_side() {
+    // A cuboid with edges rounded by 1 mm, larger than the triangles below it: no one vertex can carry it.
+    let half = [0.007, 0.007, 0.005];
+    let rounded =
+        golden_spiral(800).map(|p| Point3::from(Vector3::from_fn(|k, _| p[k] * 1e-3 + p[k].signum() * half[k])));
+    let polytope = ConvexPolytope::hull(rounded.collect()).unwrap();
+    assert!(polytope.vertices().len() > 64);
+    let planes = polytope.planes().to_vec();
+    let depth = 0.003;
+    let mut run = Scene::wedge(E, 0.45).tool(tool("t", ToolShape::ConvexHull { polytope })).run();
+    let origin = Point3::new(0.05, 0.03, top(0.05)) + top_normal() * (half[2] + 1e-3 - depth);
+    let pose = Isometry3::from_parts(origin.into(), facing_top(0.0));
+    press_and_hold(&mut run, pose, depth, 2.0);
+    let placed = planes.iter().map(|plane| {
+        let normal = pose.rotation * plane.normal;
+        (normal, normal.dot(&pose.translation.vector) + plane.offset_m)
+    });
+    let penetration = polytope_penetration(&run, &placed.collect::<Vec<_>>());
+    let before = run.force();
+    let mut largest_change: f64 = 0.0;
+    for _ in 0..200 {
+        run.tick(&[(0, pose)]);
+        largest_change = largest_change.max((run.force() - before).norm() / before.norm());
+    }
+    println!("rounded block: penetration {:.4} mm, force changes by {:.1e}", 1e3 * penetration, largest_change);
+    assert!(penetration < 0.05e-3 && largest_change < 2e-3);
+    assert_balanced(&run, "rounded block");
+}
+
 #[test]
 fn a_block_rests_on_a_plane() {
     for e in [3e3, 3e4] {

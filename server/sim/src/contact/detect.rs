@@ -11,7 +11,8 @@ use super::solid::{NumberedVertex, Placement, Segment, Solid, UNKNOWN_PLANE, nea
 use super::surface::SkinSurface;
 use crate::embedding::SkinPositions;
 
-/// Features closer than this share of an edge to its end are left to the end.
+/// Features closer than this share of an edge to its end are left to the end, unless they are in contact already: a contact that
+/// lets go where it began would come back at once, and the tool would never rest.
 const INTERIOR: f32 = 0.05;
 
 /// Gap from which a vertex has no weight in the contact point \[m\].
@@ -37,6 +38,8 @@ pub(crate) struct Candidate {
     pub(crate) normal: V3,
     /// Signed distance \[m\].
     pub(crate) gap: f32,
+    /// A contact here is continued but does not begin: a neighbouring feature is as good.
+    pub(crate) is_fringe: bool,
 }
 
 /// Search region: a placed body and its surroundings.
@@ -216,7 +219,8 @@ impl Detector {
                     surface.triangles_around(v).iter().map(|&t| surface.triangle_normal(skin, t as usize)).sum();
                 if normal.dot(&outward) <= FAR_SIDE * outward.norm() {
                     let (vertices, weights) = ([v as u32; 3], [1.0, 0.0, 0.0]);
-                    self.push(Candidate { feature: feature(0, v, 0), vertices, weights, point, normal, gap });
+                    let feature = feature(0, v, 0);
+                    self.push(Candidate { feature, vertices, weights, point, normal, gap, is_fringe: false });
                 }
             }
         }
@@ -239,7 +243,7 @@ impl Detector {
                 let Some((t, gap, normal)) = edge_minimum(search, [p, q], [v0, v1].map(|v| self.planes[v])) else {
                     continue;
                 };
-                if gap >= reach || !(INTERIOR..=1.0 - INTERIOR).contains(&t) {
+                if gap >= reach || !(0.0..=1.0).contains(&t) {
                     continue;
                 }
                 let sides = surface.edge_triangles[e as usize].map(|t| surface.triangle_normal(skin, t as usize));
@@ -248,7 +252,9 @@ impl Detector {
                     let vertices = [v0 as u32, v1 as u32, v0 as u32];
                     let point = p + (q - p) * t;
                     let weights = [1.0 - t, t, 0.0];
-                    self.push(Candidate { feature: feature(1, e as usize, 0), vertices, weights, point, normal, gap });
+                    let is_fringe = !(INTERIOR..=1.0 - INTERIOR).contains(&t);
+                    let feature = feature(1, e as usize, 0);
+                    self.push(Candidate { feature, vertices, weights, point, normal, gap, is_fringe });
                 }
             }
         }
@@ -308,7 +314,8 @@ impl Detector {
         let weights = [1.0 - w1 - w2, w1, w2];
         // The edge test misses a sharp corner right above the edge: its nearest face may be a side of the tool.
         let interior = if radius > 0.0 { INTERIOR } else { 0.0 };
-        if weights.iter().any(|w| *w < interior) {
+        let least = weights.iter().copied().fold(1.0, f32::min);
+        if least < 0.0 {
             return;
         }
         let distance = height * inverse.sqrt();
@@ -317,7 +324,16 @@ impl Detector {
             let point = a * weights[0] + b * weights[1] + c * weights[2];
             let feature = feature(2, triangle as usize, tool.number);
             let vertices = search.surface.triangles[triangle as usize];
-            self.push(Candidate { feature, vertices, weights, point, normal: -normal * inverse.sqrt(), gap });
+            let is_fringe = least < interior;
+            self.push(Candidate {
+                feature,
+                vertices,
+                weights,
+                point,
+                normal: -normal * inverse.sqrt(),
+                gap,
+                is_fringe,
+            });
         }
     }
 

@@ -169,6 +169,9 @@ impl Rows {
             let is_same = |o: &Contact| o.body == selection.body && o.feature == c.feature;
             let old = selection.old.iter().position(is_same);
             let load = old.map_or(0.0, |o| selection.old[o].normal_force);
+            if c.is_fringe && load <= 0.0 {
+                continue;
+            }
             let old = old.map(|o| o as u32);
             self.ranked.push(Ranked { load, predicted_gap, candidate: index as u32, old });
         }
