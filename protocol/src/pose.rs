@@ -1,7 +1,7 @@
 //! Device poses, input: `PLPS`, 96 bytes, or the same as JSON.
 //!
-//! Both forms pass the same gate ([`Pose::checked`]): finite numbers, a position within [`MAX_POSITION_M`], an
-//! orientation of unit length within [`UNIT_TOLERANCE`], which is then normalised.
+//! Both forms pass the same gate ([`Pose::checked_for`]): finite numbers, a position within [`MAX_POSITION_M`] after the tool's
+//! `position_scale`, an orientation of unit length within [`UNIT_TOLERANCE`], which is then normalised.
 
 use serde::{Deserialize, Serialize};
 
@@ -32,7 +32,7 @@ pub struct Pose {
     pub source_id: u32,
     /// False while the tracker does not see the tool.
     pub valid: bool,
-    /// Position in the tracker's frame, in metres.
+    /// Position in the tracker's frame, in metres after the tool's `position_scale`.
     pub position_m: [f64; 3],
     /// Unit quaternion `x y z w`.
     pub orientation_xyzw: [f64; 4],
@@ -72,8 +72,13 @@ impl Pose {
             .finish()
     }
 
-    /// Decodes 96 bytes and applies the gate. Unknown flag bits are ignored.
+    /// [`Self::decode_for`] a tracker that measures in metres.
     pub fn decode(bytes: &[u8]) -> Result<Self, DecodeError> {
+        Self::decode_for(bytes, 1.0)
+    }
+
+    /// Decodes 96 bytes and applies the gate. Unknown flag bits are ignored.
+    pub fn decode_for(bytes: &[u8], position_scale: f64) -> Result<Self, DecodeError> {
         let mut fields = open_exact(bytes, MAGIC, BYTES)?;
         Self {
             sequence: fields.u64(),
@@ -85,13 +90,18 @@ impl Pose {
             buttons: fields.u32(),
             grip: fields.f32(),
         }
-        .checked()
+        .checked_for(position_scale)
+    }
+
+    /// [`Self::decode_json_for`] a tracker that measures in metres.
+    pub fn decode_json(bytes: &[u8]) -> Result<Self, DecodeError> {
+        Self::decode_json_for(bytes, 1.0)
     }
 
     /// Decodes the JSON form and applies the gate.
-    pub fn decode_json(bytes: &[u8]) -> Result<Self, DecodeError> {
+    pub fn decode_json_for(bytes: &[u8], position_scale: f64) -> Result<Self, DecodeError> {
         let json: JsonPose = from_object(bytes).map_err(|error| DecodeError::Json(error.to_string()))?;
-        json.to_pose()
+        json.to_pose(position_scale)
     }
 
     /// Encodes the JSON form with all fields.
@@ -99,17 +109,23 @@ impl Pose {
         serde_json::to_string(&JsonPose::from(self)).expect("numbers always serialise")
     }
 
+    /// [`Self::checked_for`] a tracker that measures in metres.
+    pub fn checked(self) -> Result<Self, DecodeError> {
+        self.checked_for(1.0)
+    }
+
     /// The gate: the pose with a normalised orientation, or the reason of its refusal.
     ///
     /// ```text
+    /// position_scale |p| <= 1e3 m
     /// q <- q / |q|   if | |q| - 1 | <= 1e-2
     /// ```
-    /// A quaternion of unit length to rounding keeps its bits, so that a second gate changes nothing.
-    pub fn checked(mut self) -> Result<Self, DecodeError> {
+    /// The position is not scaled. A quaternion of unit length to rounding keeps its bits, so that a second gate changes nothing.
+    pub fn checked_for(mut self, position_scale: f64) -> Result<Self, DecodeError> {
         finite("position", &self.position_m)?;
         finite("orientation", &self.orientation_xyzw)?;
         finite("grip", &[f64::from(self.grip)])?;
-        let distance_m = norm(&self.position_m);
+        let distance_m = position_scale * norm(&self.position_m);
         if distance_m > MAX_POSITION_M {
             return Err(DecodeError::OutOfRange { field: "position", value: distance_m, limit: MAX_POSITION_M });
         }
@@ -157,7 +173,7 @@ pub struct JsonPose {
     /// See [`Pose::valid`]; true if left out.
     #[serde(default = "yes")]
     pub valid: bool,
-    /// Position in metres.
+    /// See [`Pose::position_m`].
     pub position: [f64; 3],
     /// Quaternion `x y z w`.
     pub orientation: [f64; 4],
@@ -175,7 +191,7 @@ pub(crate) fn yes() -> bool {
 
 impl JsonPose {
     /// Applies the gate.
-    pub fn to_pose(&self) -> Result<Pose, DecodeError> {
+    pub fn to_pose(&self, position_scale: f64) -> Result<Pose, DecodeError> {
         Pose {
             sequence: self.sequence,
             source_time_ns: self.source_time_ns,
@@ -186,7 +202,7 @@ impl JsonPose {
             buttons: self.buttons,
             grip: self.grip,
         }
-        .checked()
+        .checked_for(position_scale)
     }
 }
 

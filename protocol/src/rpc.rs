@@ -184,10 +184,11 @@ impl StepPose {
         Self { tool, sequence, source_time_ns, source_id, valid, position, orientation, buttons, grip }
     }
 
-    /// Applies the gate of [`Pose::checked`].
-    pub fn to_pose(&self) -> Result<Pose, DecodeError> {
+    /// Applies the gate of [`Pose::checked_for`].
+    pub fn to_pose(&self, position_scale: f64) -> Result<Pose, DecodeError> {
         let Self { sequence, source_time_ns, source_id, valid, position, orientation, buttons, grip, .. } = *self;
-        JsonPose { sequence, source_time_ns, source_id, valid, position, orientation, buttons, grip }.to_pose()
+        JsonPose { sequence, source_time_ns, source_id, valid, position, orientation, buttons, grip }
+            .to_pose(position_scale)
     }
 }
 

@@ -173,12 +173,16 @@ pub struct ToolStatus {
     pub stale: bool,
     /// Age of the newest pose at which the tool is stale and another source takes over, in simulated milliseconds.
     pub stale_after_ms: f64,
+    /// How it follows its poses: `latest` or `interpolate`.
+    pub sampling: String,
     /// Whether it touches something.
     pub in_contact: bool,
     /// Number of active contacts.
     pub n_contacts: u32,
     /// Force on the tool in newtons, world frame.
     pub force_n: [f64; 3],
+    /// Largest change of that force from tick to tick within the last second of simulated time, in newtons.
+    pub force_step_n: f64,
     /// Whether the coupling is at its limit.
     pub saturated: bool,
     /// Times that the tool was placed anew without a sweep, because the device jumped.

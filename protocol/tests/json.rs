@@ -51,7 +51,7 @@ fn step_takes_poses_as_json() {
     let json = br#"{"ticks": 3, "poses": [{"tool": "probe", "position": [0, 0, 0.1], "orientation": [0, 0, 0, 1]}]}"#;
     let request: StepRequest = decode_request(json).unwrap();
     assert_eq!((request.ticks, request.poses[0].tool.as_str()), (3, "probe"));
-    let pose = request.poses[0].to_pose().unwrap();
+    let pose = request.poses[0].to_pose(1.0).unwrap();
     assert_eq!(pose, Pose { position_m: [0.0, 0.0, 0.1], ..Pose::default() });
     assert_eq!(StepPose::new("probe", &pose), request.poses[0]);
     let sent = serde_json::to_vec(&request).unwrap();

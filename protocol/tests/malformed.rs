@@ -72,6 +72,10 @@ fn the_gate_of_poses() {
     assert_eq!(pose_kind(at(1000.1)), "out_of_range");
     assert_eq!(pose_kind(at(-1e300)), "out_of_range");
     assert_eq!(Pose::decode(&at(-1000.0).encode()).unwrap(), at(-1000.0));
+    // A tracker that measures in millimetres.
+    assert_eq!(Pose::decode_for(&at(-1e6).encode(), 1e-3).unwrap(), at(-1e6));
+    assert_eq!(kind(Pose::decode_for(&at(1.1e6).encode(), 1e-3)), "out_of_range");
+    assert_eq!(kind(Pose::decode_json_for(at(1.1).to_json().as_bytes(), 1e3)), "out_of_range");
     let turned = |w: f64| Pose { orientation_xyzw: [0.0, 0.0, 0.0, w], ..Pose::default() };
     assert_eq!(pose_kind(turned(0.0)), "not_unit");
     assert_eq!(pose_kind(turned(0.989)), "not_unit");

@@ -1,14 +1,15 @@
 """Malformed and unwelcome poses: counted by kind, and nothing moves."""
 
 import json
+import pathlib
 import struct
 import time
 
 import numpy as np
 import zenoh
 
-from client import POSE, Source, pose, wait_until
-from conftest import STALE_S
+from client import POSE, Client, Source, pose, wait_until
+from conftest import STALE_S, Daemon
 
 # Each of these would press the tool deep into the object if it were taken.
 INSIDE = (0.06, 0.03, 0.02)
@@ -92,6 +93,23 @@ def test_a_quaternion_near_unit_length_is_taken(client):
                   encoding=zenoh.Encoding.APPLICATION_JSON)
     wait_until(lambda: probe(client)["poses_accepted"] == 2, "both to be taken")
     assert probe(client)["poses_rejected"] == {}
+
+
+def test_a_tracker_in_millimetres_is_judged_after_its_scale(plicad, scene, tmp_path):
+    text = pathlib.Path(scene).read_text().replace("[tools.probe]", "[tools.probe]\nposition_scale = 1e-3", 1)
+    path = tmp_path / "millimetres.toml"
+    path.write_text(text)
+    daemon = Daemon(plicad, str(path), tmp_path / "plicad.log")
+    try:
+        daemon.wait()
+        with Client(daemon.endpoint) as client:
+            publisher, source = client.publisher(lossless=True), Source()
+            publisher.put(source.pose((2000, 30, 80)))
+            publisher.put(source.pose((1.1e6, 0, 0)))
+            wait_for_counts(client, {"out_of_range": 1})
+            assert probe(client)["poses_accepted"] == 1
+    finally:
+        daemon.kill()
 
 
 def test_poses_of_unknown_tools_are_counted(client):

@@ -44,7 +44,7 @@ use hearing::{Hearing, Judge};
 use intake::PoseIntake;
 use port_owner::peers_of_port;
 pub use port_owner::{Peer, Process};
-pub use scene_info::SceneInfo;
+pub use scene_info::{SceneInfo, ToolInfo};
 pub use session::{BusOptions, DEFAULT_ZENOH_CONFIG};
 use shared::Shared;
 

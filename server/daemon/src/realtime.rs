@@ -6,6 +6,7 @@
 mod cadence;
 mod command;
 mod enrichment;
+mod force_steps;
 mod frame;
 mod histogram;
 mod outbox;

@@ -6,9 +6,9 @@ use plica_jobs::{DataFolderError, Jobs, Supervision};
 use plica_protocol::keys::Keys;
 use plica_scene::Config;
 use plica_scene::model::{self, SceneModelError};
-use plica_sim::Model;
+use plica_sim::{Model, Sampling, ToolDescription};
 
-use crate::bus::{Bus, BusError, BusOptions, Deaf, Parts, Peer, SceneInfo};
+use crate::bus::{Bus, BusError, BusOptions, Deaf, Parts, Peer, SceneInfo, ToolInfo};
 use crate::database_loader::{Enrichment, EnrichmentError};
 use crate::limits::{FrameTooLarge, check_frame};
 use crate::realtime::{Grants, Loop, LoopOptions, Running, ThreadOptions, spawn};
@@ -147,8 +147,19 @@ fn describe(config: &Config) -> SceneInfo {
     SceneInfo {
         name: config.name().to_owned(),
         object: config.object().name().to_owned(),
-        tools: config.tools().iter().map(|t| t.name.clone()).collect(),
-        stale_after_s: config.tools().iter().map(|t| t.stale_after_s).collect(),
+        tools: config.tools().iter().map(describe_tool).collect(),
         publish: config.object().publish(),
+    }
+}
+
+fn describe_tool(tool: &ToolDescription) -> ToolInfo {
+    ToolInfo {
+        name: tool.name.clone(),
+        stale_after_s: tool.stale_after_s,
+        position_scale: tool.position_scale,
+        sampling: match tool.sampling {
+            Sampling::Latest => "latest",
+            Sampling::Interpolate { .. } => "interpolate",
+        },
     }
 }

@@ -9,13 +9,13 @@ use plica_protocol::status::{Counters, QUEUE_FULL};
 use plica_sim::{PoseSample, ToolPose};
 
 use super::pose_gate::PoseGate;
-use super::scene_info::SceneInfo;
+use super::scene_info::{SceneInfo, ToolInfo};
 use crate::realtime::Statistics;
 use crate::wire;
 
 /// Gates and queues of poses for the simulation thread.
 pub(super) struct PoseIntake {
-    names: Vec<String>,
+    infos: Vec<ToolInfo>,
     tools: Vec<Mutex<Tool>>,
     /// Holds simulated time, which judges order and takeover: while it stands, no source becomes stale.
     statistics: Arc<Statistics>,
@@ -28,16 +28,12 @@ struct Tool {
 
 impl PoseIntake {
     pub(super) fn new(scene: &SceneInfo, queues: Vec<rtrb::Producer<PoseSample>>, statistics: Arc<Statistics>) -> Self {
-        let tool = |(stale_after_s, queue): (&f64, _)| Mutex::new(Tool { gate: PoseGate::new(*stale_after_s), queue });
-        Self {
-            names: scene.tools.clone(),
-            tools: scene.stale_after_s.iter().zip(queues).map(tool).collect(),
-            statistics,
-        }
+        let tool = |(info, queue): (&ToolInfo, _)| Mutex::new(Tool { gate: PoseGate::new(info.stale_after_s), queue });
+        Self { infos: scene.tools.clone(), tools: scene.tools.iter().zip(queues).map(tool).collect(), statistics }
     }
 
     pub(super) fn tool(&self, name: &str) -> Option<usize> {
-        self.names.iter().position(|n| n == name)
+        self.infos.iter().position(|info| info.name == name)
     }
 
     /// Handles a message for a tool.
@@ -60,14 +56,15 @@ impl PoseIntake {
         for (i, step_pose) in poses.iter().enumerate() {
             let tool = self.tool(&step_pose.tool).ok_or_else(|| self.unknown_tool(&step_pose.tool))?;
             let bad = |why: String| ErrorReply::new(ErrorCode::BadPose, format!("poses[{i}]: {why}"));
-            let pose = step_pose.to_pose().map_err(|e| bad(e.to_string()))?;
+            let pose = step_pose.to_pose(self.infos[tool].position_scale).map_err(|e| bad(e.to_string()))?;
             gates[tool].try_take(&pose, now_s).map_err(|e| bad(e.kind().to_owned()))?;
             taken.push(ToolPose { tool, sample: wire::pose_sample(&pose) });
         }
         let waits = request.ticks == 0;
         let n_for = |tool: usize| taken.iter().filter(|pose: &&ToolPose| pose.tool == tool).count();
         if let Some((tool, _)) = tools.iter().enumerate().find(|(i, t)| waits && t.queue.slots() < n_for(*i)) {
-            let message = format!("{QUEUE_FULL}: too many poses of `{}` wait for a tick; step first", self.names[tool]);
+            let message =
+                format!("{QUEUE_FULL}: too many poses of `{}` wait for a tick; step first", self.infos[tool].name);
             return Err(ErrorReply::new(ErrorCode::BadPose, message));
         }
         for (tool, gate) in tools.iter_mut().zip(gates) {
@@ -95,7 +92,8 @@ impl PoseIntake {
     }
 
     fn unknown_tool(&self, name: &str) -> ErrorReply {
-        let message = format!("the scene has no tool `{name}`; it has: {}", self.names.join(", "));
+        let names: Vec<&str> = self.infos.iter().map(|info| info.name.as_str()).collect();
+        let message = format!("the scene has no tool `{name}`; it has: {}", names.join(", "));
         ErrorReply::new(ErrorCode::UnknownTool, message)
     }
 

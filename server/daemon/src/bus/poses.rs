@@ -34,5 +34,7 @@ fn receive(shared: &Shared, binary: &Encoding, sample: &Sample) {
     let bytes = sample.payload().to_bytes();
     // Most poses are binary, and need no string.
     let is_json = sample.encoding() != binary && is_json(&sample.encoding().to_string());
-    shared.intake.arrive(tool, if is_json { Pose::decode_json(&bytes) } else { Pose::decode(&bytes) });
+    let scale = shared.scene.tools[tool].position_scale;
+    let decode = if is_json { Pose::decode_json_for } else { Pose::decode_for };
+    shared.intake.arrive(tool, decode(&bytes, scale));
 }

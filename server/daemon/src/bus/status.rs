@@ -20,6 +20,7 @@ use zenoh::query::{Query, Queryable};
 use super::error::BusError;
 use super::guard::guarded;
 use super::replies::{Content, Replies};
+use super::scene_info::ToolInfo;
 use super::shared::{Shared, spawn};
 use super::skin::Published;
 use crate::realtime::{Grants, Reading, Statistics};
@@ -147,11 +148,19 @@ fn object(shared: &Shared, reading: &Reading, published: &Published) -> ObjectSt
 }
 
 fn tools(shared: &Shared, reading: &Reading) -> BTreeMap<String, ToolStatus> {
-    let tool = |(i, (name, reading)): (usize, (&String, _))| {
+    let tool = |(i, (info, tool)): (usize, (&ToolInfo, _))| {
         let (poses_accepted, poses_rejected) = shared.intake.counts(i);
         // Rounded to a microsecond: 0.2 s is 200 ms.
-        let stale_after_ms = (1e6 * shared.scene.stale_after_s[i]).round() / 1e3;
-        (name.clone(), ToolStatus { stale_after_ms, poses_accepted, poses_rejected, ..wire::tool_status(reading) })
+        let stale_after_ms = (1e6 * info.stale_after_s).round() / 1e3;
+        let of_bus = ToolStatus {
+            stale_after_ms,
+            sampling: info.sampling.to_owned(),
+            poses_accepted,
+            poses_rejected,
+            force_step_n: reading.force_steps_n[i],
+            ..wire::tool_status(tool)
+        };
+        (info.name.clone(), of_bus)
     };
     shared.scene.tools.iter().zip(&reading.tools).enumerate().map(tool).collect()
 }

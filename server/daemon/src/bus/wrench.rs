@@ -28,7 +28,7 @@ struct Stream {
 }
 
 pub(super) fn start(shared: &Arc<Shared>, ports: Vec<WrenchPort>) -> Result<JoinHandle<()>, BusError> {
-    let streams = ports.into_iter().zip(&shared.scene.tools).map(|(port, tool)| declare(shared, port, tool));
+    let streams = ports.into_iter().zip(&shared.scene.tools).map(|(port, tool)| declare(shared, port, &tool.name));
     let streams: Vec<_> = streams.collect::<Result<_, _>>()?;
     let shared = Arc::clone(shared);
     spawn("plica-wrench", move || run(&shared, streams))

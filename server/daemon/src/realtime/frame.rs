@@ -65,4 +65,6 @@ pub struct Reading {
     pub confidence: Option<f32>,
     /// All tools, `[n_tools]`.
     pub tools: Vec<ToolReading>,
+    /// Largest change of each tool's force from tick to tick lately, `[n_tools]` \[N\].
+    pub force_steps_n: Vec<f64>,
 }

@@ -8,6 +8,7 @@ use triple_buffer::Input;
 
 use super::cadence::Cadence;
 use super::enrichment::Detail;
+use super::force_steps::ForceSteps;
 use super::frame::{Frame, Reading, ToolFrame};
 use super::stage_timer::TurnProbe;
 use super::statistics::Statistics;
@@ -34,6 +35,7 @@ pub(super) struct Outbox {
     pub(super) max_penetration_m: f32,
     pub(super) fallbacks: u64,
     pub(super) dropped_contacts: u64,
+    pub(super) force_steps: ForceSteps,
 }
 
 /// One tool's wrenches.
@@ -79,6 +81,7 @@ impl Outbox {
         probe: &mut impl TurnProbe,
     ) {
         self.note(present.report);
+        self.force_steps.note(present.state.tick(), present.state.tools().iter().map(|tool| tool.force_n));
         self.hand_out_wrenches(present.state, detail, statistics);
         self.hand_out_frame(present, detail, probe);
         self.hand_out_reading(present, detail, false);
@@ -179,6 +182,7 @@ impl Outbox {
         reading.database_generation = detail.generation();
         reading.confidence = detail.least_confidence();
         reading.tools.copy_from_slice(state.tools());
+        self.force_steps.write(&mut reading.force_steps_n);
         self.readings.publish();
     }
 }

@@ -10,6 +10,7 @@ use triple_buffer::triple_buffer;
 
 use super::command::{Command, EarlyEnd, EarlyEndCause, Outcome, Refusal, Reply, Returned};
 use super::enrichment::Detail;
+use super::force_steps::ForceSteps;
 use super::frame::{Frame, Reading};
 use super::outbox::{Cadences, Outbox, Present, ToolOutlet};
 use super::ports::{CommandPort, FramePort, Ports, WrenchPort};
@@ -346,7 +347,11 @@ fn connect_outbox(
 ) -> (Outbox, FramePort, Vec<WrenchPort>, triple_buffer::Output<Reading>) {
     let frame = Frame { positions: vec![[0.0; 3]; model.n_skin()], ..Frame::default() };
     let (frames, frames_out) = triple_buffer(&frame);
-    let (readings, readings_out) = triple_buffer(&Reading { tools: rest.tools().to_vec(), ..Reading::default() });
+    let (readings, readings_out) = triple_buffer(&Reading {
+        tools: rest.tools().to_vec(),
+        force_steps_n: vec![0.0; model.n_tools()],
+        ..Reading::default()
+    });
     let (skin_waker, wrench_waker) = (Arc::new(Waker::default()), Arc::new(Waker::default()));
     let (listening, questions) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
     let tool = |_| {
@@ -379,6 +384,7 @@ fn connect_outbox(
         max_penetration_m: 0.0,
         fallbacks: 0,
         dropped_contacts: 0,
+        force_steps: ForceSteps::new(model.n_tools(), model.timestep_s()),
     };
     (outbox, frame_port, wrench_ports, readings_out)
 }

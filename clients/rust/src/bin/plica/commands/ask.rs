@@ -4,11 +4,14 @@ use std::collections::BTreeMap;
 
 use anyhow::Context;
 use plica_client::Client;
-use plica_client::protocol::status::{Distribution, ObjectStatus, STAGES, Status};
+use plica_client::protocol::status::{Distribution, ObjectStatus, STAGES, Status, ToolStatus};
 use serde_json::Value;
 
 use crate::args::Rpc;
 use crate::output::Output;
+
+/// Share of the force that a change within a tick is felt from.
+const ROUGH: f64 = 0.05;
 
 pub(crate) fn status(client: &Client, output: Output) -> anyhow::Result<()> {
     let value = client.status_json()?;
@@ -56,7 +59,8 @@ fn table(status: &Status) -> String {
         };
         let [x, y, z] = tool.force_n;
         let accepted = tool.poses_accepted;
-        lines.push(format!("tool {name}: {state}, force [{x:.3}, {y:.3}, {z:.3}] N, {accepted} poses"));
+        let step = force_step(tool);
+        lines.push(format!("tool {name}: {state}, force [{x:.3}, {y:.3}, {z:.3}] N{step}, {accepted} poses"));
         lines.extend(tool.poses_rejected.iter().map(|(kind, n)| format!("  rejected {kind}: {n}")));
     }
     lines.extend(status.rejected.iter().map(|(kind, n)| format!("rejected {kind}: {n}")));
@@ -73,6 +77,17 @@ fn table(status: &Status) -> String {
 fn in_order_of_a_tick(stages: &BTreeMap<String, Distribution>) -> impl Iterator<Item = (&String, &Distribution)> {
     let known = STAGES.iter().filter_map(|name| stages.get_key_value(*name));
     known.chain(stages.iter().filter(|(name, _)| !STAGES.contains(&name.as_str())))
+}
+
+/// How rough the force lately is, and the remedy where poses that come slower than ticks make it so.
+fn force_step(tool: &ToolStatus) -> String {
+    if tool.force_step_n == 0.0 {
+        return String::new();
+    }
+    let norm = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let is_rough = tool.in_contact && tool.force_step_n > ROUGH * norm(&tool.force_n) && tool.sampling == "latest";
+    let remedy = if is_rough { "; sampling = \"interpolate\" has no steps from slow poses" } else { "" };
+    format!(" (steps of up to {:.3} N a tick{remedy})", tool.force_step_n)
 }
 
 fn enrichment(object: &ObjectStatus) -> String {
