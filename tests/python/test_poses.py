@@ -96,7 +96,7 @@ def test_a_quaternion_near_unit_length_is_taken(client):
 
 
 def test_a_tracker_in_millimetres_is_judged_after_its_scale(plicad, scene, tmp_path):
-    text = pathlib.Path(scene).read_text().replace("[tools.probe]", "[tools.probe]\nposition_scale = 1e-3", 1)
+    text = pathlib.Path(scene).read_text().replace("position_scale = 1.0", "position_scale = 1e-3", 1)
     path = tmp_path / "millimetres.toml"
     path.write_text(text)
     daemon = Daemon(plicad, str(path), tmp_path / "plicad.log")
