@@ -3,7 +3,8 @@
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::perm::PermRef;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+    CholeskySymbolicParams, LdltRef, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky, supernodal::SupernodalLdltRef,
 };
 use faer::sparse::{FaerError, SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
@@ -19,6 +20,8 @@ pub(crate) struct Factor {
     values: Vec<f64>,
     memory: MemBuffer,
     solution: Vec<f64>,
+    /// Whether the values are those of `L D L^T`, for a matrix that need not be positive definite.
+    is_indefinite: bool,
 }
 
 /// The analysis ran out of memory.
@@ -44,10 +47,11 @@ impl Factor {
         let pattern = SymbolicSparseColMat::new_checked(n, n, starts, None, rows);
         let symbolic = analyse(hessian, pattern.as_ref(), rest_positions).map_err(|_| error)?;
         let factorise = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
+        let indefinite = symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
         let solve = symbolic.solve_in_place_scratch::<f64>(1, Par::Seq);
-        let memory = MemBuffer::try_new(factorise.or(solve)).map_err(|_| error)?;
+        let memory = MemBuffer::try_new(factorise.or(indefinite).or(solve)).map_err(|_| error)?;
         let values = vec![0.0; symbolic.len_val()];
-        Ok(Self { pattern, symbolic, values, memory, solution: vec![0.0; n] })
+        Ok(Self { pattern, symbolic, values, memory, solution: vec![0.0; n], is_indefinite: false })
     }
 
     /// Values of the factor.
@@ -58,6 +62,7 @@ impl Factor {
     pub(crate) fn factorise(&mut self, hessian: &Hessian) -> Result<(), Indefinite> {
         let matrix = SparseColMatRef::new(self.pattern.as_ref(), hessian.values());
         let stack = MemStack::new(&mut self.memory);
+        self.is_indefinite = false;
         self.symbolic
             .factorize_numeric_llt(
                 &mut self.values,
@@ -72,18 +77,61 @@ impl Factor {
             .map_err(|_| Indefinite)
     }
 
+    /// `L D L^T` without exchange of rows; the number of negative entries of `D`, which by Sylvester's law of inertia is that of
+    /// negative eigenvalues \[GVL13, 8.1.5\]. The caller judges by a residual whether the factor is accurate.
+    pub(crate) fn factorise_indefinite(&mut self, hessian: &Hessian) -> Result<usize, Indefinite> {
+        let matrix = SparseColMatRef::new(self.pattern.as_ref(), hessian.values());
+        let stack = MemStack::new(&mut self.memory);
+        self.is_indefinite = true;
+        self.symbolic
+            .factorize_numeric_ldlt(
+                &mut self.values,
+                matrix,
+                Side::Lower,
+                Default::default(),
+                Par::Seq,
+                stack,
+                Default::default(),
+            )
+            .map_err(|_| Indefinite)?;
+        Ok(self.count_negative())
+    }
+
+    fn count_negative(&self) -> usize {
+        match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Simplicial(columns) => {
+                let starts = &columns.col_ptr()[..columns.ncols()];
+                starts.iter().filter(|&&start| self.values[start] < 0.0).count()
+            }
+            SymbolicCholeskyRaw::Supernodal(nodes) => {
+                let factor = SupernodalLdltRef::new(nodes, &self.values);
+                let of_node = |s: usize| {
+                    let block = factor.supernode(s).val();
+                    (0..block.ncols()).filter(|&k| block[(k, k)] < 0.0).count()
+                };
+                (0..nodes.n_supernodes()).map(of_node).sum()
+            }
+        }
+    }
+
     /// `H^-1 right_hand_side` for vectors at the nodes; 0 at nodes with all coordinates given.
     pub(crate) fn solve(&mut self, hessian: &Hessian, right_hand_side: &[Vector3<f64>], out: &mut [Vector3<f64>]) {
         for (block, values) in self.solution.chunks_exact_mut(3).enumerate() {
-            values.copy_from_slice(right_hand_side[hessian.node_of_block(block)].as_slice());
+            let node = hessian.node_of_block(block);
+            values.copy_from_slice(hessian.along_axes(node, &right_hand_side[node]).as_slice());
         }
         let n = self.solution.len();
-        let factor = LltRef::new(&self.symbolic, &self.values);
         let rhs = MatMut::from_column_major_slice_mut(&mut self.solution, n, 1);
-        factor.solve_in_place_with_conj(Conj::No, rhs, Par::Seq, MemStack::new(&mut self.memory));
+        let stack = MemStack::new(&mut self.memory);
+        if self.is_indefinite {
+            LdltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack);
+        } else {
+            LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack);
+        }
         out.fill(Vector3::zeros());
         for (block, values) in self.solution.chunks_exact(3).enumerate() {
-            out[hessian.node_of_block(block)] = Vector3::new(values[0], values[1], values[2]);
+            let node = hessian.node_of_block(block);
+            out[node] = hessian.from_axes(node, &Vector3::new(values[0], values[1], values[2]));
         }
     }
 }

@@ -30,8 +30,13 @@ pub struct Hessian {
     /// `-H_free,given dx_given`, `[n_nodes]` \[N\].
     lift: Vec<Vector3<f64>>,
     has_motion: bool,
+    /// Frames other than x, y, z; rows and columns of their nodes are along their axes.
+    frames: Vec<Matrix3<f64>>,
+    /// Frame of each node, `NO_FRAME` for most.
+    frame_of_node: Vec<u32>,
 }
 
+const NO_FRAME: u32 = u32::MAX;
 const GIVEN: u32 = u32::MAX;
 
 impl Hessian {
@@ -56,6 +61,10 @@ impl Hessian {
             value_starts.push(value_starts[value_starts.len() - 1] + 6 + 9 * (rows.len() - 1));
         }
         let n_values = value_starts[columns.len()];
+        let mut frame_of_node = vec![NO_FRAME; n_nodes];
+        for (i, node) in constraints.frames().keys().enumerate() {
+            frame_of_node[*node] = i as u32;
+        }
         Self {
             block_of_node,
             node_of_block,
@@ -67,12 +76,15 @@ impl Hessian {
             given_motion: vec![Vector3::zeros(); n_nodes],
             lift: vec![Vector3::zeros(); n_nodes],
             has_motion: false,
+            frames: constraints.frames().values().copied().collect(),
+            frame_of_node,
         }
     }
 
     /// `H v` for vectors at the nodes; 0 at given coordinates, and those of `v` count as 0.
     pub fn multiply(&self, v: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         let mut product = vec![Vector3::zeros(); self.block_of_node.len()];
+        let v: Vec<_> = v.iter().enumerate().map(|(node, v)| self.along_axes(node, v)).collect();
         for column in 0..self.n_blocks() {
             let j = self.node_of_block(column);
             for place in 0..self.column_starts[column + 1] - self.column_starts[column] {
@@ -84,7 +96,7 @@ impl Hessian {
                 }
             }
         }
-        product
+        product.iter().enumerate().map(|(node, v)| self.from_axes(node, v)).collect()
     }
 
     /// Adds the second derivatives of one stencil: `block(a, b)` couples `nodes[a]` and `nodes[b]` and is called once
@@ -117,7 +129,33 @@ impl Hessian {
         if i == GIVEN || j == GIVEN {
             return;
         }
+        let turned = self.turned(row, column, block);
+        let block = turned.as_ref().unwrap_or(block);
         if i >= j { self.add_lower(i, j, block) } else { self.add_lower(j, i, &block.transpose()) }
+    }
+
+    /// Components of a vector at a node along the axes of its frame.
+    pub(crate) fn along_axes(&self, node: usize, v: &Vector3<f64>) -> Vector3<f64> {
+        self.frame(node).map_or(*v, |frame| frame.tr_mul(v))
+    }
+
+    /// The vector with the given components along the axes of a node's frame.
+    pub(crate) fn from_axes(&self, node: usize, v: &Vector3<f64>) -> Vector3<f64> {
+        self.frame(node).map_or(*v, |frame| frame * v)
+    }
+
+    fn frame(&self, node: usize) -> Option<&Matrix3<f64>> {
+        self.frames.get(self.frame_of_node[node] as usize)
+    }
+
+    /// The block along the axes of its nodes, where they differ from x, y, z.
+    fn turned(&self, row: usize, column: usize, block: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+        match (self.frame(row), self.frame(column)) {
+            (None, None) => None,
+            (Some(left), None) => Some(left.tr_mul(block)),
+            (None, Some(right)) => Some(block * right),
+            (Some(left), Some(right)) => Some(left.tr_mul(block) * right),
+        }
     }
 
     /// Sets all values to 0, and the motion of given coordinates in this step \[m\], `[n_nodes]`.

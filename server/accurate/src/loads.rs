@@ -1,5 +1,7 @@
-//! Loads: forces that keep their direction, and pressure that follows the surface.
+//! Loads: forces that keep their direction, and pressures and moments that follow the surface.
 
+mod body;
+mod couple;
 mod pressure;
 mod quad;
 
@@ -8,6 +10,8 @@ use plica_geometry::{HexMesh, NodeIdx};
 
 use crate::energy::{Energy, Projection};
 use crate::hessian::Hessian;
+pub use body::body_forces;
+pub use couple::Couple;
 pub use pressure::Pressure;
 use quad::{QUAD_GAUSS_POINTS, corners, normal};
 

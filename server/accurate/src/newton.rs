@@ -4,6 +4,7 @@ mod direction;
 mod gmres;
 mod line_search;
 mod report;
+mod stability;
 mod sufficient_decrease;
 
 use std::ops::ControlFlow;
@@ -16,6 +17,7 @@ use crate::energy::Energy;
 use crate::factor::{Factor, FactorError};
 use crate::hessian::Hessian;
 pub use report::{Info, Params, Progress, SolveError};
+pub use stability::Mode;
 use sufficient_decrease::Total;
 
 /// Forces below this share of stiffness times position are rounding.
@@ -216,11 +218,7 @@ fn dot(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
 }
 
 fn clear_given(vectors: &mut [Vector3<f64>], constraints: &Constraints) {
-    for (node, v) in vectors.iter_mut().enumerate() {
-        for (k, _) in constraints.is_given(node).iter().enumerate().filter(|(_, given)| **given) {
-            v[k] = 0.0;
-        }
-    }
+    vectors.iter_mut().enumerate().for_each(|(node, v)| constraints.clear_given(node, v));
 }
 
 /// Unlike `f64::max`, keeps NaN.

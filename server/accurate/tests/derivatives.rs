@@ -9,7 +9,8 @@ use common::random::Random;
 use common::{MODELS, distorted_block, material, rest};
 use nalgebra::{Point3, Vector3};
 use plica_accurate::{
-    Energy, Material, MaterialModel, NodalForces, Pressure, Projection, Solid, Tie, TieOptions, TieTarget, Traction,
+    Couple, Energy, Material, MaterialModel, NodalForces, Pressure, Projection, Solid, Tie, TieOptions, TieTarget,
+    Traction,
 };
 use plica_geometry::{Embedding, EmbeddingKind, HexMesh, NodeIdx, VertexIdx};
 
@@ -97,6 +98,8 @@ fn loads() {
         check_derivatives("nodal forces", &NodalForces::new(forces.clone()), &x, CELL);
         check_derivatives("traction", &Traction::new(&mesh, &quads[..3], Vector3::new(10.0, -20.0, 5.0)), &x, CELL);
         check_derivatives("pressure on some faces", &Pressure::new(quads[..4].to_vec(), 100.0), &x, CELL);
+        let couple = Couple::new(&mesh, &quads[..3], Vector3::new(1.0, -2.0, 3.0));
+        check_derivatives("couple", &couple, &x, CELL);
         check_derivatives("pressure on all faces", &Pressure::new(quads.clone(), -50.0), &x, CELL);
     }
 }

@@ -58,7 +58,7 @@ impl Solver {
     }
 
     /// Projections are for energies with a potential and without.
-    fn factorise(
+    pub(super) fn factorise(
         &mut self,
         problem: &Problem<'_>,
         projections: [Projection; 2],
