@@ -42,7 +42,7 @@ impl Constraints {
     }
 
     /// Gives the coordinate `direction . x` of a node \[m\], for a unit vector of any direction. Where earlier conditions of the
-    /// node determine it, nothing changes, and the distance from what they give is returned \[m\].
+    /// node determine it, nothing changes, and what `position_m` exceeds theirs by is returned \[m\].
     pub fn give_along(&mut self, node: usize, direction: &Vector3<f64>, position_m: f64) -> Option<f64> {
         let given: Vec<_> = (0..3).filter(|&k| self.is_given[node][k]).map(|k| self.axis(node, k)).collect();
         let targets: Vec<_> = (0..3).filter(|&k| self.is_given[node][k]).map(|k| self.target[node][k]).collect();
@@ -53,7 +53,7 @@ impl Constraints {
         }
         let size = open.norm();
         if size <= DETERMINED {
-            return Some(position.abs());
+            return Some(position);
         }
         let (open, position) = (open / size, position / size);
         let along = (0..3).find(|&k| open == unit(k) && !self.frames.contains_key(&node));

@@ -27,7 +27,7 @@ pub use factor::FactorError;
 pub use hessian::Hessian;
 pub use loads::{Couple, NodalForces, Pressure, Traction, body_forces};
 pub use material::{Lame, Material, MaterialError, MaterialModel};
-pub use newton::{Info, Mode, Params, Progress, SolveError, Solver};
+pub use newton::{ArcState, Info, Loading, Mode, Params, Progress, SolveError, Solver};
 pub use reaction::reactions;
 pub use solid::{GAUSS_POINTS, Solid, SolidError};
 pub use tie::{TIE_VERSION, Tie, TieOptions, TieTarget};

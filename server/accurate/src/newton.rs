@@ -1,5 +1,6 @@
 //! Newton's method with a line search on a sum of energies.
 
+mod arc_length;
 mod direction;
 mod gmres;
 mod line_search;
@@ -16,6 +17,7 @@ use crate::constraints::Constraints;
 use crate::energy::Energy;
 use crate::factor::{Factor, FactorError};
 use crate::hessian::Hessian;
+pub use arc_length::{ArcState, Loading};
 pub use report::{Info, Params, Progress, SolveError};
 pub use stability::Mode;
 use sufficient_decrease::Total;

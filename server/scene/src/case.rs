@@ -1,8 +1,11 @@
 //! Case files of `plicad solve`: [`RawCase`] as typed, [`Case`] checked, [`Problem`] with its selections resolved.
 
+mod arc;
 mod checked;
+mod extrapolation;
 mod follow;
 mod held;
+mod load;
 mod material;
 mod mesh;
 mod output;
@@ -12,18 +15,23 @@ mod raw;
 mod reading;
 mod select;
 mod solution;
+mod stable;
 mod support;
+mod tool;
+mod touch;
 
-pub use checked::{Case, SolveOptions};
-pub use follow::{Failure, News, follow};
+pub use checked::{ArcLength, Case, SolveOptions};
+pub use follow::{Failure, News, StepError, follow};
+pub use load::Load;
 pub use mesh::MeshSource;
 pub use output::write_result;
 pub use probe::Probe;
-pub use problem::{Load, Problem};
+pub use problem::Problem;
 pub use raw::RawCase;
 pub use reading::Reading;
-pub use solution::{LoadStep, Solution};
+pub use solution::{LoadStep, Solution, Stability};
 pub use support::Support;
+pub use tool::Tool;
 
 use std::sync::OnceLock;
 

@@ -27,6 +27,8 @@ pub enum Obstacle {
     Polytope(ConvexPolytope),
     /// All points of any part; their smallest signed distance counts.
     Union(Vec<Obstacle>),
+    /// A shape at a pose of its own in the frame.
+    Posed(Box<Obstacle>, Isometry3<f64>),
 }
 
 /// Signed distance `g` of a point to an obstacle and its derivatives.
@@ -63,6 +65,7 @@ impl Obstacle {
                 let face = polytope.distance(point);
                 flat(face.distance_m, face.normal)
             }
+            Self::Posed(part, pose) => part.gap(pose, point),
             Self::Union(parts) => {
                 let nearest = parts.iter().map(|part| part.local_gap(point));
                 let far = flat(f64::INFINITY, Vector3::z());

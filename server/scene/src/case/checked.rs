@@ -3,13 +3,14 @@
 use std::path::Path;
 
 use plica_accurate::Material;
-use plica_geometry::select::Selector;
 
+use super::load::{self, LoadSpec};
 use super::material::{self, Region};
 use super::mesh::{self, MeshSource};
 use super::probe::{self, ProbeSpec};
-use super::raw::{RawCase, RawLoad, RawSolve, RawSupport};
-use super::select;
+use super::raw::{RawCase, RawSolve};
+use super::support::{self, SupportSpec};
+use super::tool::{self, Tool};
 use crate::checks::Check;
 use crate::document::Document;
 use crate::error::ConfigError;
@@ -25,38 +26,14 @@ pub struct Case {
     pub(super) name: String,
     pub(super) mesh: MeshSource,
     pub(super) material: Material,
+    /// Density of everything that no region claims [kg/m3].
+    pub(super) density_kg_per_m3: Option<f64>,
     pub(super) regions: Vec<Region>,
     pub(super) supports: Vec<SupportSpec>,
     pub(super) loads: Vec<LoadSpec>,
+    pub(super) tools: Vec<Tool>,
     pub(super) probes: Vec<ProbeSpec>,
     solve: SolveOptions,
-}
-
-/// Support: nodes with given displacements along some axes.
-#[derive(Debug, Clone)]
-pub(super) struct SupportSpec {
-    pub(super) name: String,
-    pub(super) selector: Selector,
-    pub(super) axes: [bool; 3],
-    pub(super) displacement_m: [f64; 3],
-}
-
-/// A load and its selector.
-#[derive(Debug, Clone)]
-pub(super) struct LoadSpec {
-    pub(super) selector: Selector,
-    pub(super) kind: LoadKind,
-}
-
-/// Kinds of loads.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum LoadKind {
-    /// Force per rest area \[Pa\].
-    Traction([f64; 3]),
-    /// Pressure on the deformed surface \[Pa\].
-    Pressure(f64),
-    /// Total force \[N\].
-    Force([f64; 3]),
 }
 
 /// Load stepping and tolerance of the solver.
@@ -70,6 +47,19 @@ pub struct SolveOptions {
     pub max_iterations: u32,
     /// Most successive halvings of a part that fails.
     pub max_halvings: u32,
+    /// Arc length in place of equal parts of the loads.
+    pub arc_length: Option<ArcLength>,
+    /// Whether unstable equilibria are left along their softest mode.
+    pub follow_stable: bool,
+}
+
+/// Steps along the path of equilibria.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ArcLength {
+    /// Largest motion of any node in a step \[m\].
+    pub step_m: f64,
+    /// Steps after which the path ends.
+    pub max_steps: u32,
 }
 
 impl Case {
@@ -105,10 +95,12 @@ impl Case {
             mesh: mesh::check(&check, &raw.mesh)?,
             material,
             regions: material::check_regions(&check, &raw.regions, &raw.material, material)?,
-            supports: check_supports(&check, &raw.supports)?,
-            loads: check_loads(&check, &raw.loads)?,
-            probes: probe::check(&check, &raw.probes, &raw.supports)?,
-            solve: solve_options(&raw.solve),
+            density_kg_per_m3: raw.material.density_kg_per_m3,
+            supports: support::check(&check, &raw.supports)?,
+            loads: load::check(&check, &raw)?,
+            tools: tool::check(&check, &raw.tools)?,
+            probes: probe::check(&check, &raw)?,
+            solve: solve_options(&check, &raw)?,
             document,
         })
     }
@@ -131,10 +123,11 @@ impl Case {
 
 /// Refuses empty names, and names used twice in a list.
 fn check_names(c: &Check<'_>, raw: &RawCase) -> Result<(), ConfigError> {
-    let lists: [(&str, Vec<&str>); 4] = [
+    let lists: [(&str, Vec<&str>); 5] = [
         ("regions", raw.regions.iter().map(|r| r.name.as_str()).collect()),
         ("supports", raw.supports.iter().map(|s| s.name.as_str()).collect()),
         ("loads", raw.loads.iter().map(|l| l.name.as_str()).collect()),
+        ("tools", raw.tools.iter().map(|t| t.name.as_str()).collect()),
         ("probes", raw.probes.iter().map(|p| p.name.as_str()).collect()),
     ];
     for (list, names) in lists {
@@ -155,48 +148,25 @@ fn check_names(c: &Check<'_>, raw: &RawCase) -> Result<(), ConfigError> {
     Ok(())
 }
 
-fn check_supports(c: &Check<'_>, raw: &[RawSupport]) -> Result<Vec<SupportSpec>, ConfigError> {
-    let support = |(i, s): (usize, &RawSupport)| {
-        let key = format!("supports.{i}");
-        let mut axes = [false; 3];
-        s.axes.iter().for_each(|axis| axes[*axis as usize] = true);
-        if axes == [false; 3] {
-            return Err(c.error(&format!("{key}.axes"), "holds nothing", "name at least one of \"x\", \"y\", \"z\""));
+fn solve_options(c: &Check<'_>, case: &RawCase) -> Result<SolveOptions, ConfigError> {
+    let raw: &RawSolve = &case.solve;
+    if raw.arc_length.is_some() {
+        let moves = |s: &super::raw::RawSupport| s.turn.is_some() || s.displacement_m.is_some_and(|d| d != [0.0; 3]);
+        let because = "the share of the loads is unknown, so that only loads may grow";
+        if case.supports.iter().any(moves) || !case.tools.is_empty() {
+            let problem = format!("has no meaning with supports that move or tools: {because}");
+            return Err(c.error("solve.arc_length", problem, "remove the key, or load the body by forces"));
         }
-        let displacement_m = s.displacement_m.unwrap_or_default();
-        if let Some(axis) = (0..3).find(|&k| displacement_m[k] != 0.0 && !axes[k]) {
-            let problem = format!("moves along {}, which is not among the axes", ["x", "y", "z"][axis]);
-            return Err(c.error(&format!("{key}.displacement_m"), problem, "add the axis, or put 0 there"));
+        if case.loads.is_empty() {
+            return Err(c.error("solve.arc_length", "has no meaning without loads", "add [[loads]]"));
         }
-        let selector = select::check(c, &format!("{key}.select"), &s.select)?;
-        Ok(SupportSpec { name: s.name.clone(), selector, axes, displacement_m })
-    };
-    raw.iter().enumerate().map(support).collect()
-}
-
-fn check_loads(c: &Check<'_>, raw: &[RawLoad]) -> Result<Vec<LoadSpec>, ConfigError> {
-    let load = |(i, l): (usize, &RawLoad)| {
-        let key = format!("loads.{i}");
-        let kind = match (l.traction_pa, l.pressure_pa, l.force_n) {
-            (Some(t), None, None) => Ok(LoadKind::Traction(t)),
-            (None, Some(p), None) => Ok(LoadKind::Pressure(p)),
-            (None, None, Some(f)) => Ok(LoadKind::Force(f)),
-            given => {
-                let n = [given.0.is_some(), given.1.is_some(), given.2.is_some()].iter().filter(|g| **g).count();
-                let advice = "give exactly one of traction_pa, pressure_pa and force_n";
-                Err(c.error(&key, format!("has {n} of three kinds of load"), advice))
-            }
-        }?;
-        Ok(LoadSpec { selector: select::check(c, &format!("{key}.select"), &l.select)?, kind })
-    };
-    raw.iter().enumerate().map(load).collect()
-}
-
-fn solve_options(raw: &RawSolve) -> SolveOptions {
-    SolveOptions {
+    }
+    Ok(SolveOptions {
         steps: raw.steps,
         tolerance: raw.tolerance,
         max_iterations: raw.max_iterations,
         max_halvings: raw.max_halvings,
-    }
+        arc_length: raw.arc_length.map(|arc| ArcLength { step_m: arc.step_m, max_steps: arc.max_steps }),
+        follow_stable: false,
+    })
 }

@@ -3,11 +3,14 @@
 use std::ops::ControlFlow;
 
 use nalgebra::Vector3;
-use plica_accurate::{Info, Params, SolveError, Solver};
+use plica_accurate::contact::{ContactError, ContactState};
+use plica_accurate::{Energy, Info, Params, SolveError, Solver};
 
 use super::checked::SolveOptions;
-use super::problem::{Problem, energies};
-use super::solution::{LoadStep, Solution};
+use super::extrapolation::Extrapolation;
+use super::problem::Problem;
+use super::solution::{LoadStep, Solution, Stability};
+use super::stable;
 
 /// Progress of a solve, reported before every Newton step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,6 +25,17 @@ pub struct News {
     pub residual: f64,
 }
 
+/// Why a load step has no equilibrium.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StepError {
+    /// Newton's method failed.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// Contact with the tools failed.
+    #[error("contact with the tools: {0}")]
+    Contact(#[from] ContactError),
+}
+
 /// Why the loads cannot be applied completely.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Failure {
@@ -33,11 +47,24 @@ pub enum Failure {
         /// Share of the failed step.
         target: f64,
         /// Error of the last attempt.
-        error: SolveError,
+        error: StepError,
     },
     /// Ended by the observer, or out of memory.
     #[error(transparent)]
-    Solve(#[from] SolveError),
+    Solve(#[from] StepError),
+}
+
+impl StepError {
+    /// Whether smaller steps cannot help.
+    pub(super) fn is_final(&self) -> bool {
+        matches!(
+            self,
+            Self::Solve(SolveError::Cancelled { .. } | SolveError::Factor(_))
+                | Self::Contact(
+                    ContactError::Cancelled { .. } | ContactError::Solve { source: SolveError::Factor(_), .. }
+                )
+        )
+    }
 }
 
 /// Applies the loads of `problem` from rest on. `observer` is called before every Newton step and may cancel.
@@ -49,31 +76,88 @@ pub fn follow(
     options: &SolveOptions,
     observer: &mut dyn FnMut(News) -> ControlFlow<()>,
 ) -> Result<Solution, Failure> {
-    let mut path = Path::new(problem, options)?;
+    if let Some(arc) = options.arc_length {
+        return super::arc::follow(problem, options, &arc, observer);
+    }
+    let mut path = Path::new(problem, options).map_err(StepError::from)?;
     let (n_unknowns, n_factor_values) = path.solver.size();
-    let mut x: Vec<_> = problem.mesh().nodes().iter().map(|node| node.coords).collect();
-    let largest_step = 1.0 / f64::from(options.steps);
+    let mut state = State::at_rest(problem);
+    let largest_step = problem.touch().map_or(1.0, |touch| touch.longest_step(problem.tools()));
+    let largest_step = largest_step.min(1.0 / f64::from(options.steps));
     let least_step = largest_step * 0.5_f64.powi(options.max_halvings as i32);
-    let (mut reached, mut step, mut n_failed, mut steps) = (0.0, largest_step, 0, Vec::new());
+    let (mut reached, mut step, mut n_failed, mut n_left) = (0.0, largest_step, 0, 0);
+    let (mut steps, mut past) = (Vec::new(), Extrapolation::default());
     while reached < 1.0 {
         // A remainder of rounding does not get a step of its own.
         let target = if reached + 1.01 * step >= 1.0 { 1.0 } else { reached + step };
-        let mut trial = x.clone();
+        let mut trial = state.clone();
+        if problem.touch().is_none() {
+            let guess = past.guess(reached, &state.x, target);
+            trial.x = guess.into_iter().find(|guess| is_admissible(problem, guess)).unwrap_or(trial.x);
+        }
         match path.attempt([reached, target], &mut trial, observer) {
             Ok(info) => {
-                steps.push(LoadStep::new(target, info));
-                (x, reached) = (trial, target);
+                steps.push(info);
+                past.push(reached, std::mem::replace(&mut state, trial).x);
+                reached = target;
                 step = (2.0 * step).min(largest_step);
+                if options.follow_stable && problem.touch().is_none() {
+                    let left = path.leave(reached, &mut state, observer)?;
+                    n_left += left.len() as u32;
+                    if !left.is_empty() {
+                        past = Extrapolation::default();
+                    }
+                    steps.extend(left);
+                }
             }
-            Err(error @ (SolveError::Cancelled { .. } | SolveError::Factor(_))) => return Err(error.into()),
+            Err(error) if error.is_final() => return Err(error.into()),
             Err(error) if step <= least_step => return Err(Failure::Stuck { reached, target, error }),
             Err(_) => {
                 n_failed += 1;
                 step *= 0.5;
+                past = Extrapolation::default();
             }
         }
     }
-    Ok(Solution { x, steps, n_failed, n_unknowns, n_factor_values })
+    let stability = path.stability(&state);
+    let (tool_loads, contact_forces) = match (problem.touch(), &state.contact) {
+        (Some(touch), Some(contact)) => touch.loads(problem.tools(), contact, &state.x),
+        _ => Default::default(),
+    };
+    Ok(Solution {
+        x: state.x,
+        share: 1.0,
+        stability,
+        n_left,
+        limit_loads: Vec::new(),
+        tool_loads,
+        contact_forces,
+        steps,
+        n_failed,
+        n_unknowns,
+        n_factor_values,
+    })
+}
+
+/// Equilibrium with its contact.
+#[derive(Debug, Clone)]
+struct State {
+    x: Vec<Vector3<f64>>,
+    contact: Option<ContactState>,
+}
+
+impl State {
+    fn at_rest(problem: &Problem) -> Self {
+        let x: Vec<_> = problem.mesh().nodes().iter().map(|node| node.coords).collect();
+        let contact = problem.touch().map(|touch| touch.untouched(problem.tools(), &x));
+        Self { x, contact }
+    }
+}
+
+/// Whether a Newton solve may start at `x`.
+fn is_admissible(problem: &Problem, x: &[Vector3<f64>]) -> bool {
+    let solid = problem.solid();
+    solid.value(x).is_finite() && solid.smallest_jacobian(x).is_none_or(|j| problem.is_linear() || j > 0.0)
 }
 
 /// Inputs of all load steps.
@@ -86,23 +170,75 @@ struct Path<'a> {
 impl<'a> Path<'a> {
     fn new(problem: &'a Problem, options: &SolveOptions) -> Result<Self, SolveError> {
         let loads = problem.loads_at(1.0);
-        let solver = Solver::new(&problem.constraints_at(1.0), &energies(problem.solid(), &loads))?;
+        let solver = Solver::new(&problem.constraints_at(1.0), &problem.energies(&loads))?;
         let params = Params { tolerance: options.tolerance, max_iterations: options.max_iterations };
         Ok(Self { problem, params, solver })
     }
 
-    /// Moves `x` from the equilibrium under one share of the loads to that under another.
+    /// Moves `state` from the equilibrium under one share of the loads to that under another.
     fn attempt(
         &mut self,
         [reached, target]: [f64; 2],
-        x: &mut [Vector3<f64>],
+        state: &mut State,
         observer: &mut dyn FnMut(News) -> ControlFlow<()>,
-    ) -> Result<Info, SolveError> {
-        let loads = self.problem.loads_at(target);
-        let energies = energies(self.problem.solid(), &loads);
+    ) -> Result<LoadStep, StepError> {
         let mut observe = |progress: plica_accurate::Progress| {
             observer(News { reached, target, iteration: progress.iteration, residual: progress.residual })
         };
-        self.solver.minimise(&energies, &self.problem.constraints_at(target), &self.params, x, &mut observe)
+        if let (Some(touch), Some(contact)) = (self.problem.touch(), &mut state.contact) {
+            let watch = &mut |progress: plica_accurate::contact::ContactProgress| observe(progress.newton);
+            let info = touch.follow(self.problem, target, &mut self.solver, contact, &mut state.x, watch)?;
+            return Ok(LoadStep::of_contact(target, &info));
+        }
+        Ok(LoadStep::new(target, self.minimise(target, &mut state.x, &mut observe)?))
+    }
+
+    fn minimise(
+        &mut self,
+        share: f64,
+        x: &mut [Vector3<f64>],
+        observer: &mut dyn FnMut(plica_accurate::Progress) -> ControlFlow<()>,
+    ) -> Result<Info, SolveError> {
+        let loads = self.problem.loads_at(share);
+        let energies = self.problem.energies(&loads);
+        self.solver.minimise(&energies, &self.problem.constraints_at(share), &self.params, x, observer)
+    }
+
+    /// Leaves unstable equilibria along their softest modes, until one is stable or no way down is found; a load step for
+    /// each.
+    fn leave(
+        &mut self,
+        share: f64,
+        state: &mut State,
+        observer: &mut dyn FnMut(News) -> ControlFlow<()>,
+    ) -> Result<Vec<LoadStep>, StepError> {
+        let loads = self.problem.loads_at(share);
+        let (energies, constraints) = (self.problem.energies(&loads), self.problem.constraints_at(share));
+        let mut left = Vec::new();
+        for _ in 0..stable::MAX_DEPARTURES {
+            let Some(start) = stable::departure(&mut self.solver, &energies, &constraints, &state.x) else { break };
+            let mut trial = State { x: start, contact: None };
+            match self.attempt([share, share], &mut trial, observer) {
+                Ok(step) => left.push(step),
+                Err(error) if error.is_final() => return Err(error),
+                Err(_) => break,
+            }
+            state.x = trial.x;
+        }
+        Ok(left)
+    }
+
+    fn stability(&mut self, state: &State) -> Stability {
+        let (problem, constraints) = (self.problem, self.problem.constraints_at(1.0));
+        let n_negative = match (problem.touch(), &state.contact) {
+            (Some(touch), Some(contact)) => {
+                touch.n_negative(problem, &mut self.solver, contact, &state.x, &constraints)
+            }
+            _ => {
+                let loads = problem.loads_at(1.0);
+                self.solver.n_negative(&problem.energies(&loads), &constraints, &state.x)
+            }
+        };
+        Stability::new(n_negative)
     }
 }

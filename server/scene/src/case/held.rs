@@ -12,18 +12,19 @@ const LEAST_HOLD: f64 = 1e-6;
 
 /// Refuses a case in which a body can move without deformation.
 ///
-/// A small rigid motion `u(x) = t + w x (x - c)` moves the held coordinate `k` of a node by `u_k`. The sum of these squares over
-/// held coordinates is a quadratic form in `(t, size w)`: where its least eigenvalue is 0, that motion is free.
+/// A small rigid motion `u(x) = t + w x (x - c)` moves a node along a held direction `d` by `d . u`. The sum of these squares over
+/// held directions is a quadratic form in `(t, size w)`: where its least eigenvalue is 0, that motion is free.
 pub(super) fn check(document: &Document, mesh: &HexMesh, supports: &[Support]) -> Result<(), ConfigError> {
     let (body_of_node, n_bodies) = mesh.bodies();
     for body in 0..n_bodies {
         let nodes: Vec<_> = (0..mesh.n_nodes()).filter(|&n| body_of_node[n] == body).map(|n| mesh.nodes()[n]).collect();
         let (centre, size) = extent(&nodes);
         let mut form = Matrix6::zeros();
-        for (node, axes) in supports.iter().flat_map(|s| &s.nodes) {
+        for (node, direction) in supports.iter().flat_map(|s| &s.rows) {
             if body_of_node[node.index()] == body {
                 let arm = (mesh.nodes()[node.index()] - centre) / size;
-                (0..3).filter(|&k| axes[k]).map(|k| moved(k, &arm)).for_each(|row| form += row * row.transpose());
+                let row = moved(direction, &arm);
+                form += row * row.transpose();
             }
         }
         if let Some(motion) = free_motion(&form) {
@@ -39,12 +40,10 @@ fn extent(nodes: &[Point3<f64>]) -> (Point3<f64>, f64) {
     (centre, nodes.iter().map(|x| (x - centre).norm()).fold(0.0, f64::max))
 }
 
-/// Displacement of coordinate `k` of a node, as a row over `(t, size w)`: `e_k . (t + w x arm)`.
-fn moved(k: usize, arm: &Vector3<f64>) -> Vector6<f64> {
-    let mut axis = Vector3::zeros();
-    axis[k] = 1.0;
-    let by_rotation = arm.cross(&axis);
-    Vector6::new(axis.x, axis.y, axis.z, by_rotation.x, by_rotation.y, by_rotation.z)
+/// Displacement of a node along `d`, as a row over `(t, size w)`: `d . (t + w x arm)`.
+fn moved(d: &Vector3<f64>, arm: &Vector3<f64>) -> Vector6<f64> {
+    let by_rotation = arm.cross(d);
+    Vector6::new(d.x, d.y, d.z, by_rotation.x, by_rotation.y, by_rotation.z)
 }
 
 fn free_motion(form: &Matrix6<f64>) -> Option<Vector6<f64>> {

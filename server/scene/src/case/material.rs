@@ -16,6 +16,8 @@ const LAMBDA_OVER_MU: [f64; 2] = [-0.5, 5e5];
 pub(super) struct Region {
     pub(super) selector: Selector,
     pub(super) material: Material,
+    /// Its own density [kg/m3], if it has one.
+    pub(super) density_kg_per_m3: Option<f64>,
 }
 
 pub(super) fn check(c: &Check<'_>, raw: &RawMaterial) -> Result<Material, ConfigError> {
@@ -37,13 +39,18 @@ pub(super) fn check_regions(
             poisson_ratio: r.poisson_ratio,
             mu_pa: r.mu_pa,
             lambda_pa: r.lambda_pa,
+            density_kg_per_m3: r.density_kg_per_m3,
         };
         let keeps_constants = [r.young_modulus_pa, r.poisson_ratio, r.mu_pa, r.lambda_pa] == [None; 4];
         let material = match keeps_constants {
             true => Material { model: model(own.model), ..material },
             false => constants(c, &key, &own)?,
         };
-        Ok(Region { selector: select::check(c, &format!("{key}.select"), &r.select)?, material })
+        Ok(Region {
+            selector: select::check(c, &format!("{key}.select"), &r.select)?,
+            material,
+            density_kg_per_m3: r.density_kg_per_m3,
+        })
     };
     raw.iter().enumerate().map(region).collect()
 }

@@ -6,7 +6,7 @@ use plica_geometry::isoparametric::shape_functions;
 use plica_geometry::select::Selector;
 use plica_geometry::{HexIdx, Location, NodeIdx, locate};
 
-use super::raw::{RawProbe, RawQuantity, RawSupport};
+use super::raw::{RawCase, RawProbe, RawQuantity};
 use super::select;
 use crate::checks::Check;
 use crate::document::Document;
@@ -27,9 +27,17 @@ enum Target {
     DisplacementAt(Point3<f64>),
     DisplacementNearest(Point3<f64>),
     DisplacementOver(Selector),
-    Force(usize),
+    Force(Source),
+    Moment(Source, Point3<f64>),
     Volume,
     StressAt(Point3<f64>),
+}
+
+/// Source of a force on the body, by its number in the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Source {
+    Support(usize),
+    Tool(usize),
 }
 
 /// A probe resolved to nodes or a hexahedron.
@@ -44,25 +52,27 @@ pub struct Probe {
 pub(super) enum Sensor {
     /// Weighted sum of displacements.
     Displacement(Vec<(NodeIdx, f64)>),
-    /// Force of a support by number.
-    Force(usize),
+    Force(Source),
+    /// About a point \[m\].
+    Moment(Source, Point3<f64>),
     Volume,
     /// Cauchy stress at reference coordinates of a hexahedron.
     Stress(HexIdx, [f64; 3]),
 }
 
-pub(super) fn check(c: &Check<'_>, raw: &[RawProbe], supports: &[RawSupport]) -> Result<Vec<ProbeSpec>, ConfigError> {
+pub(super) fn check(c: &Check<'_>, raw: &RawCase) -> Result<Vec<ProbeSpec>, ConfigError> {
     let probe = |(i, p): (usize, &RawProbe)| {
-        let target = check_target(c, &format!("probes.{i}"), p, supports)?;
+        let target = check_target(c, &format!("probes.{i}"), p, raw)?;
         Ok(ProbeSpec { name: p.name.clone(), target })
     };
-    raw.iter().enumerate().map(probe).collect()
+    raw.probes.iter().enumerate().map(probe).collect()
 }
 
-fn check_target(c: &Check<'_>, key: &str, p: &RawProbe, supports: &[RawSupport]) -> Result<Target, ConfigError> {
+fn check_target(c: &Check<'_>, key: &str, p: &RawProbe, raw: &RawCase) -> Result<Target, ConfigError> {
     let (quantity, allowed): (&str, &[&str]) = match p.quantity {
         RawQuantity::Displacement => ("displacement", &["at_m", "nearest_to_m", "select"]),
-        RawQuantity::Force => ("force", &["support"]),
+        RawQuantity::Force => ("force", &["support", "tool"]),
+        RawQuantity::Moment => ("moment", &["support", "tool"]),
         RawQuantity::Stress => ("stress", &["at_m"]),
         RawQuantity::Volume => ("volume", &[]),
     };
@@ -71,6 +81,7 @@ fn check_target(c: &Check<'_>, key: &str, p: &RawProbe, supports: &[RawSupport])
         ("nearest_to_m", p.nearest_to_m.is_some()),
         ("select", p.select.is_some()),
         ("support", p.support.is_some()),
+        ("tool", p.tool.is_some()),
     ];
     let given: Vec<&str> = given.iter().filter(|(_, is_given)| *is_given).map(|(name, _)| *name).collect();
     if let Some(name) = given.iter().find(|name| !allowed.contains(name)) {
@@ -80,24 +91,38 @@ fn check_target(c: &Check<'_>, key: &str, p: &RawProbe, supports: &[RawSupport])
         let advice = format!("give exactly one of {}", allowed.join(", "));
         return Err(c.error(key, format!("{quantity} is asked for at {} places", given.len()), advice));
     }
-    match (p.quantity, p.at_m, p.nearest_to_m, &p.select, &p.support) {
+    if p.quantity != RawQuantity::Moment {
+        c.absent(&format!("{key}.about_m"), &p.about_m, quantity)?;
+    }
+    match (p.quantity, p.at_m, p.nearest_to_m, &p.select) {
         (RawQuantity::Displacement, Some(x), ..) => Ok(Target::DisplacementAt(x.into())),
         (RawQuantity::Displacement, _, Some(x), ..) => Ok(Target::DisplacementNearest(x.into())),
-        (RawQuantity::Displacement, .., Some(s), _) => {
+        (RawQuantity::Displacement, .., Some(s)) => {
             select::check(c, &format!("{key}.select"), s).map(Target::DisplacementOver)
         }
         (RawQuantity::Stress, Some(x), ..) => Ok(Target::StressAt(x.into())),
-        (.., Some(name)) => check_support(c, key, name, supports).map(Target::Force),
+        (RawQuantity::Force, ..) => check_source(c, key, p, raw).map(Target::Force),
+        (RawQuantity::Moment, ..) => {
+            let about = Point3::from(p.about_m.unwrap_or_default());
+            check_source(c, key, p, raw).map(|source| Target::Moment(source, about))
+        }
         _ => Ok(Target::Volume),
     }
 }
 
-fn check_support(c: &Check<'_>, key: &str, name: &str, supports: &[RawSupport]) -> Result<usize, ConfigError> {
-    supports.iter().position(|s| s.name == name).ok_or_else(|| {
-        let known: Vec<&str> = supports.iter().map(|s| s.name.as_str()).collect();
-        let problem = format!("there is no support `{name}`");
-        c.error(&format!("{key}.support"), problem, format!("name one of: {}", known.join(", ")))
-    })
+fn check_source(c: &Check<'_>, key: &str, p: &RawProbe, raw: &RawCase) -> Result<Source, ConfigError> {
+    let supports = || raw.supports.iter().map(|s| s.name.as_str()).collect::<Vec<_>>();
+    let tools = || raw.tools.iter().map(|t| t.name.as_str()).collect::<Vec<_>>();
+    let find = |kind: &str, name: &str, known: Vec<&str>| {
+        known.iter().position(|n| *n == name).ok_or_else(|| {
+            let problem = format!("there is no {kind} `{name}`");
+            c.error(&format!("{key}.{kind}"), problem, format!("name one of: {}", known.join(", ")))
+        })
+    };
+    match (&p.support, &p.tool) {
+        (Some(name), _) => find("support", name, supports()).map(Source::Support),
+        (None, name) => find("tool", name.as_deref().unwrap_or_default(), tools()).map(Source::Tool),
+    }
 }
 
 impl ProbeSpec {
@@ -112,7 +137,8 @@ impl ProbeSpec {
                 let share = 1.0 / nodes.len() as f64;
                 Sensor::Displacement(nodes.into_iter().map(|node| (node, share)).collect())
             }
-            Target::Force(support) => Sensor::Force(*support),
+            Target::Force(source) => Sensor::Force(*source),
+            Target::Moment(source, about) => Sensor::Moment(*source, *about),
             Target::Volume => Sensor::Volume,
             Target::StressAt(x) => {
                 let found = find(document, key, mesh, x)?;

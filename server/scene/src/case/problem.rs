@@ -1,15 +1,17 @@
 //! A case with its selections resolved.
 
 use nalgebra::Vector3;
-use plica_accurate::{Constraints, Energy, Material, MaterialModel, NodalForces, Pressure, Solid, Traction, reactions};
+use plica_accurate::{Constraints, Energy, Material, MaterialModel, Solid, reactions};
+use plica_geometry::HexMesh;
 use plica_geometry::import::NamedMesh;
-use plica_geometry::{HexMesh, NodeIdx};
 
-use super::checked::{Case, LoadKind, LoadSpec};
+use super::checked::Case;
+use super::load::{self, Body, Load};
 use super::probe::Probe;
 use super::support::{self, Support};
+use super::tool::Tool;
+use super::touch::Touch;
 use super::{held, select};
-use crate::document::Document;
 use crate::error::ConfigError;
 use crate::extents::{self, Size};
 
@@ -25,18 +27,16 @@ pub struct Problem {
     region_of_hex: Vec<usize>,
     supports: Vec<Support>,
     loads: Vec<Load>,
+    tools: Vec<Tool>,
+    touch: Option<Touch>,
     probes: Vec<Probe>,
 }
 
-/// A load at full strength.
-#[derive(Debug, Clone)]
-pub enum Load {
-    /// Force per rest area \[Pa\] on faces.
-    Traction(Vec<[NodeIdx; 4]>, Vector3<f64>),
-    /// Pressure \[Pa\] on deformed faces.
-    Pressure(Vec<[NodeIdx; 4]>, f64),
-    /// Forces \[N\] at nodes.
-    Forces(Vec<(NodeIdx, Vector3<f64>)>),
+/// Solid with the region and the density of each hexahedron \[kg/m^3\].
+struct Parts {
+    solid: Solid,
+    region_of_hex: Vec<usize>,
+    densities_kg_per_m3: Vec<f64>,
 }
 
 impl Problem {
@@ -50,18 +50,38 @@ impl Problem {
         let mut mesh = case.mesh.load(document)?;
         let mut remarks = std::mem::take(&mut mesh.remarks);
         check_extents(case, &mesh.mesh, &mut remarks)?;
-        let (solid, region_of_hex) = make_solid(case, &mesh)?;
+        let Parts { solid, region_of_hex, densities_kg_per_m3 } = make_solid(case, &mesh)?;
         let supports = support::find(document, &case.supports, &mesh)?;
         held::check(document, &mesh.mesh, &supports)?;
+        let is_held = is_held(&supports, mesh.mesh.n_nodes());
+        let body = Body { mesh: &mesh, densities_kg_per_m3: &densities_kg_per_m3, is_held: &is_held };
         let loads = case.loads.iter().enumerate();
-        let loads = loads.map(|(i, load)| find_load(document, &format!("loads.{i}"), load, &mesh));
+        let loads = loads.map(|(i, spec)| load::find(document, &format!("loads.{i}"), spec, &body, &mut remarks));
         let loads = loads.collect::<Result<_, _>>()?;
         let probes = case.probes.iter().enumerate();
         let probes = probes.map(|(i, probe)| probe.resolve(document, &format!("probes.{i}"), &mesh));
         let probes = probes.collect::<Result<_, _>>()?;
         let is_linear = case.materials().all(|material| material.model == MaterialModel::Linear);
         let may_collapse = case.materials().any(|m| m.model == MaterialModel::CompressibleNeoHookean);
-        Ok(Self { mesh, solid, is_linear, may_collapse, remarks, region_of_hex, supports, loads, probes })
+        let tools = case.tools.clone();
+        let mut problem = Self {
+            mesh,
+            solid,
+            is_linear,
+            may_collapse,
+            remarks,
+            region_of_hex,
+            supports,
+            loads,
+            tools,
+            touch: None,
+            probes,
+        };
+        if !problem.tools.is_empty() {
+            let softest = case.materials().map(|m| m.young_modulus_pa).fold(f64::INFINITY, f64::min);
+            problem.touch = Some(Touch::new(&problem, softest));
+        }
+        Ok(problem)
     }
 
     /// The mesh at rest.
@@ -109,15 +129,28 @@ impl Problem {
         &self.probes
     }
 
+    /// Tools in the order of the file.
+    pub fn tools(&self) -> &[Tool] {
+        &self.tools
+    }
+
+    /// Contact with the tools, where there are any.
+    pub(super) fn touch(&self) -> Option<&Touch> {
+        self.touch.as_ref()
+    }
+
+    /// Whether loads follow the surface, so that equilibria have no energy.
+    pub fn has_follower_loads(&self) -> bool {
+        self.loads.iter().any(|load| matches!(load, Load::Pressure(..) | Load::Moment(..)))
+    }
+
     /// Constraints under a share of the given displacements.
     pub(super) fn constraints_at(&self, share: f64) -> Constraints {
         let mut constraints = Constraints::none(self.mesh().n_nodes());
         for support in &self.supports {
-            for (node, axes) in &support.nodes {
-                let x = self.mesh().nodes()[node.index()];
-                for k in (0..3).filter(|&k| axes[k]) {
-                    constraints.give(node.index(), k, x[k] + share * support.displacement_m[k]);
-                }
+            for (node, direction) in &support.rows {
+                let position = support.position(&self.mesh().nodes()[node.index()], share);
+                constraints.give_along(node.index(), direction, direction.dot(&position));
             }
         }
         constraints
@@ -128,18 +161,43 @@ impl Problem {
         self.loads.iter().map(|load| load.at(self.mesh(), share)).collect()
     }
 
-    /// Force of a support on the body at node positions `x` \[N\].
-    pub(super) fn support_force(&self, support: usize, x: &[Vector3<f64>]) -> Vector3<f64> {
-        let loads = self.loads_at(1.0);
-        let forces = reactions(&energies(&self.solid, &loads), x);
-        let held = self.supports[support].nodes.iter();
-        held.map(|(node, axes)| Vector3::from_fn(|k, _| if axes[k] { forces[node.index()][k] } else { 0.0 })).sum()
+    /// Elasticity and loads as energies of the solver.
+    pub(super) fn energies<'a>(&'a self, loads: &'a [Box<dyn Energy>]) -> Vec<&'a dyn Energy> {
+        std::iter::once(&self.solid as &dyn Energy).chain(loads.iter().map(Box::as_ref)).collect()
+    }
+
+    /// Forces of a support on its nodes, in the order of its rows \[N\], given the force of all supports on each node. Where
+    /// several directions of a node are held, `f = sum_i l_i d_i` splits it among them.
+    pub(super) fn support_forces(&self, support: usize, forces: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let mut of_node = vec![Vec::new(); forces.len()];
+        for (node, direction) in self.supports.iter().flat_map(|s| &s.rows) {
+            of_node[node.index()].push(*direction);
+        }
+        let share = |(node, direction): &(plica_geometry::NodeIdx, Vector3<f64>)| {
+            let directions = nalgebra::Matrix3xX::from_columns(&of_node[node.index()]);
+            let which = of_node[node.index()].iter().position(|d| d == direction).unwrap_or_default();
+            let normal = directions.transpose() * &directions;
+            let sizes = normal.lu().solve(&(directions.transpose() * forces[node.index()]));
+            direction * sizes.map_or(0.0, |sizes| sizes[which])
+        };
+        self.supports[support].rows.iter().map(share).collect()
+    }
+
+    /// Forces that hold the body at node positions `x` under a share of the loads, `[n_nodes]` \[N\]; at equilibrium 0 but at supports
+    /// and, unless `contact` has the forces of the tools, where tools touch.
+    pub(super) fn holding_forces(&self, x: &[Vector3<f64>], share: f64, contact: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let loads = self.loads_at(share);
+        let mut forces = reactions(&self.energies(&loads), x);
+        forces.iter_mut().zip(contact).for_each(|(force, contact)| *force -= contact);
+        forces
     }
 }
 
-/// Elasticity and loads as energies of the solver.
-pub(super) fn energies<'a>(solid: &'a Solid, loads: &'a [Box<dyn Energy>]) -> Vec<&'a dyn Energy> {
-    std::iter::once(solid as &dyn Energy).chain(loads.iter().map(Box::as_ref)).collect()
+/// Whether all of a node's motion is held.
+fn is_held(supports: &[Support], n_nodes: usize) -> Vec<bool> {
+    let mut n_directions = vec![0; n_nodes];
+    supports.iter().flat_map(|s| &s.rows).for_each(|(node, _)| n_directions[node.index()] += 1);
+    n_directions.into_iter().map(|n| n == 3).collect()
 }
 
 /// Refuses a mesh of impossible extents, and tells unusual ones.
@@ -158,49 +216,21 @@ fn check_extents(case: &Case, mesh: &HexMesh, remarks: &mut Vec<String>) -> Resu
     }
 }
 
-fn make_solid(case: &Case, mesh: &NamedMesh) -> Result<(Solid, Vec<usize>), ConfigError> {
+fn make_solid(case: &Case, mesh: &NamedMesh) -> Result<Parts, ConfigError> {
     let mut materials: Vec<Material> = vec![case.material; mesh.mesh.n_hexes()];
     let mut region_of_hex = vec![0; mesh.mesh.n_hexes()];
+    let mut densities_kg_per_m3 = vec![case.density_kg_per_m3.unwrap_or_default(); mesh.mesh.n_hexes()];
     for (i, region) in case.regions.iter().enumerate() {
         let hexes = region.selector.hexes(&mesh.mesh, &mesh.groups);
         let key = format!("regions.{i}.select");
         for hex in hexes.map_err(|e| select::explain(&case.document, &key, &mesh.mesh, &e))? {
             materials[hex.index()] = region.material;
             region_of_hex[hex.index()] = i + 1;
+            densities_kg_per_m3[hex.index()] = region.density_kg_per_m3.or(case.density_kg_per_m3).unwrap_or_default();
         }
     }
     let solid = Solid::new(&mesh.mesh, &materials);
     let refused =
         |e: plica_accurate::SolidError| case.document.error("material", e.to_string(), "change the constants");
-    Ok((solid.map_err(refused)?, region_of_hex))
-}
-
-fn find_load(document: &Document, key: &str, spec: &LoadSpec, mesh: &NamedMesh) -> Result<Load, ConfigError> {
-    let explain = |e| select::explain(document, &format!("{key}.select"), &mesh.mesh, &e);
-    let faces = spec.selector.faces(&mesh.mesh, &mesh.groups);
-    Ok(match (spec.kind, faces) {
-        (LoadKind::Traction(traction), faces) => Load::Traction(faces.map_err(explain)?, traction.into()),
-        (LoadKind::Pressure(pressure), faces) => Load::Pressure(faces.map_err(explain)?, pressure),
-        (LoadKind::Force(force), Ok(faces)) => {
-            let area: f64 = faces.iter().map(|quad| mesh.mesh.quad_area(quad)).sum();
-            Load::Traction(faces, Vector3::from(force) / area)
-        }
-        (LoadKind::Force(force), Err(_)) => {
-            let nodes = spec.selector.nodes(&mesh.mesh, &mesh.groups).map_err(explain)?;
-            let share = Vector3::from(force) / nodes.len() as f64;
-            Load::Forces(nodes.into_iter().map(|node| (node, share)).collect())
-        }
-    })
-}
-
-impl Load {
-    fn at(&self, mesh: &HexMesh, share: f64) -> Box<dyn Energy> {
-        match self {
-            Self::Traction(quads, traction_pa) => Box::new(Traction::new(mesh, quads, traction_pa * share)),
-            Self::Pressure(quads, pressure_pa) => Box::new(Pressure::new(quads.clone(), pressure_pa * share)),
-            Self::Forces(forces) => {
-                Box::new(NodalForces::new(forces.iter().map(|(node, force)| (*node, force * share)).collect()))
-            }
-        }
-    }
+    Ok(Parts { solid: solid.map_err(refused)?, region_of_hex, densities_kg_per_m3 })
 }

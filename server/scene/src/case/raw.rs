@@ -28,6 +28,9 @@ pub struct RawCase {
     /// Loads on the body.
     #[serde(default)]
     pub loads: Vec<RawLoad>,
+    /// Rigid tools that touch the body.
+    #[serde(default)]
+    pub tools: Vec<RawCaseTool>,
     /// Quantities to report.
     #[serde(default)]
     pub probes: Vec<RawProbe>,
@@ -107,6 +110,9 @@ pub struct RawMaterial {
     /// Lamé's first parameter [Pa], with `mu_pa`.
     #[schemars(range(min = -5e12, max = 5e18))]
     pub lambda_pa: Option<f64>,
+    /// Density [kg/m3], for `gravity_m_per_s2`.
+    #[schemars(range(min = 1e-3, max = 1e5))]
+    pub density_kg_per_m3: Option<f64>,
 }
 
 /// Material laws.
@@ -143,6 +149,9 @@ pub struct RawRegion {
     /// Lamé's first parameter [Pa], with `mu_pa`.
     #[schemars(range(min = -5e12, max = 5e18))]
     pub lambda_pa: Option<f64>,
+    /// Density [kg/m3], that of `material` where left out.
+    #[schemars(range(min = 1e-3, max = 1e5))]
+    pub density_kg_per_m3: Option<f64>,
 }
 
 /// A part of the mesh; all given conditions must hold.
@@ -181,25 +190,42 @@ pub struct RawSupport {
     pub name: String,
     /// Nodes.
     pub select: RawSelect,
-    /// Directions in which the nodes are held.
-    #[serde(default = "all_axes")]
-    pub axes: Vec<RawAxis>,
-    /// Displacement of the nodes [m]; 0 where left out.
+    /// Directions in which the nodes are held; all where left out.
+    pub axes: Option<Vec<RawAxis>>,
+    /// Only direction in which the nodes are held, of any length: a roller or a plane of symmetry at any angle. In place of `axes`.
+    #[schemars(inner(range(min = -1e3, max = 1e3)))]
+    pub normal: Option<[f64; 3]>,
+    /// Displacement of the nodes [m], along held directions; 0 where left out.
     #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
     pub displacement_m: Option<[f64; 3]>,
+    /// Rotation of the nodes about an axis; held axes follow it.
+    pub turn: Option<RawTurn>,
 }
 
-fn all_axes() -> Vec<RawAxis> {
-    vec![RawAxis::X, RawAxis::Y, RawAxis::Z]
+/// Rotation about an axis in space.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawTurn {
+    /// Direction of the axis, of any length.
+    #[schemars(inner(range(min = -1e3, max = 1e3)))]
+    pub axis: [f64; 3],
+    /// Point on the axis [m]; the origin where left out.
+    #[serde(default)]
+    #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
+    pub through_m: [f64; 3],
+    /// Angle [degrees], right-handed.
+    #[schemars(range(min = -3600.0, max = 3600.0))]
+    pub angle_deg: f64,
 }
 
-/// A load on boundary faces, by exactly one of `traction_pa`, `pressure_pa`, `force_n`.
+/// A load, of exactly one kind.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawLoad {
     /// Name, for messages.
     pub name: String,
-    /// Boundary faces; with `force_n` also nodes.
+    /// Boundary faces; with `force_n` also nodes; with `nodal_force_n` nodes; with `body_force_n_per_m3` and `gravity_m_per_s2`
+    /// hexahedra.
     pub select: RawSelect,
     /// Dead load: force per rest area [Pa].
     #[schemars(inner(range(min = -LARGEST_LOAD, max = LARGEST_LOAD)))]
@@ -210,6 +236,81 @@ pub struct RawLoad {
     /// Dead load: total force [N], spread evenly over the faces, or over the nodes where no face is selected.
     #[schemars(inner(range(min = -LARGEST_LOAD, max = LARGEST_LOAD)))]
     pub force_n: Option<[f64; 3]>,
+    /// Dead load: total force [N], in equal parts on all selected nodes, inner ones too.
+    #[schemars(inner(range(min = -LARGEST_LOAD, max = LARGEST_LOAD)))]
+    pub nodal_force_n: Option<[f64; 3]>,
+    /// Follower load: moment [N m] on the faces, about an axis that keeps its direction, by forces that turn with the faces and
+    /// have no resultant.
+    #[schemars(inner(range(min = -LARGEST_LOAD, max = LARGEST_LOAD)))]
+    pub moment_n_m: Option<[f64; 3]>,
+    /// Dead load: force per rest volume [N/m3].
+    #[schemars(inner(range(min = -LARGEST_LOAD, max = LARGEST_LOAD)))]
+    pub body_force_n_per_m3: Option<[f64; 3]>,
+    /// Weight: acceleration [m/s2], times the density of each hexahedron's material.
+    #[schemars(inner(range(min = -1e6, max = 1e6)))]
+    pub gravity_m_per_s2: Option<[f64; 3]>,
+}
+
+/// A rigid tool, which moves as the loads grow.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawCaseTool {
+    /// Name, for messages and force probes.
+    pub name: String,
+    /// Shape in the tool's own frame.
+    pub shape: RawCaseShape,
+    /// Origin of the tool's frame without loads [m].
+    #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
+    pub position_m: [f64; 3],
+    /// Direction of the shape's z axis, of any length; z where left out.
+    #[schemars(inner(range(min = -1e3, max = 1e3)))]
+    pub axis: Option<[f64; 3]>,
+    /// Motion of the tool under full loads [m].
+    #[serde(default)]
+    #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
+    pub motion_m: [f64; 3],
+    /// Coulomb friction [-]; above 0 only with a single tool.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 2.0))]
+    pub friction: f64,
+}
+
+/// Shape of a tool of a case, in its own frame.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum RawCaseShape {
+    /// Ball around the origin.
+    Ball {
+        /// Radius [m].
+        #[schemars(range(min = 1e-9, max = 1e3))]
+        radius_m: f64,
+    },
+    /// Rod with round ends, from the origin along +z.
+    Capsule {
+        /// Radius [m].
+        #[schemars(range(min = 1e-9, max = 1e3))]
+        radius_m: f64,
+        /// Distance between the centres of the two ends [m].
+        #[schemars(range(min = 1e-9, max = 1e3))]
+        length_m: f64,
+    },
+    /// Box around the origin.
+    Cuboid {
+        /// Extents along x, y, z [m].
+        #[schemars(inner(range(min = 1e-9, max = 1e3)))]
+        size_m: [f64; 3],
+    },
+    /// Flat-ended round punch from the origin along +z: a prism of 64 sides around the circle.
+    Punch {
+        /// Radius [m].
+        #[schemars(range(min = 1e-9, max = 1e3))]
+        radius_m: f64,
+        /// Length [m].
+        #[schemars(range(min = 1e-9, max = 1e3))]
+        length_m: f64,
+    },
+    /// All points with z <= 0: a floor.
+    HalfSpace {},
 }
 
 /// Quantities to report.
@@ -228,8 +329,13 @@ pub struct RawProbe {
     pub nearest_to_m: Option<[f64; 3]>,
     /// Displacement: mean over these nodes.
     pub select: Option<RawSelect>,
-    /// Force: name of the support that exerts it.
+    /// Force, moment: name of the support that exerts it.
     pub support: Option<String>,
+    /// Force, moment: name of the tool that exerts it.
+    pub tool: Option<String>,
+    /// Moment: point about which it acts [m]; the origin where left out.
+    #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
+    pub about_m: Option<[f64; 3]>,
 }
 
 /// Quantities of probes.
@@ -238,8 +344,10 @@ pub struct RawProbe {
 pub enum RawQuantity {
     /// [m], three components.
     Displacement,
-    /// Force that a support exerts on the body [N], three components.
+    /// Force that a support or a tool exerts on the body [N], three components.
     Force,
+    /// Moment that a support or a tool exerts on the body [N m], three components.
+    Moment,
     /// Deformed volume [m3].
     Volume,
     /// Cauchy stress [Pa]: xx, yy, zz, xy, yz, xz.
@@ -262,10 +370,24 @@ pub struct RawSolve {
     /// Most successive halvings of a part that fails.
     #[schemars(range(min = 0, max = 20))]
     pub max_halvings: u32,
+    /// Arc length: follows the equilibrium past limit points, the share of the loads being unknown.
+    pub arc_length: Option<RawArcLength>,
 }
 
 impl Default for RawSolve {
     fn default() -> Self {
-        Self { steps: 1, tolerance: 1e-9, max_iterations: 50, max_halvings: 8 }
+        Self { steps: 1, tolerance: 1e-9, max_iterations: 50, max_halvings: 8, arc_length: None }
     }
+}
+
+/// Steps along the path of equilibria in place of steps of the loads.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawArcLength {
+    /// Largest motion of any node in a step [m].
+    #[schemars(range(min = 1e-12, max = 1e3))]
+    pub step_m: f64,
+    /// Steps after which the path ends, unless it carries all loads before.
+    #[schemars(range(min = 1, max = 10_000))]
+    pub max_steps: u32,
 }

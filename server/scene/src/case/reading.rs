@@ -3,9 +3,10 @@
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
-use super::probe::{Probe, Sensor};
+use super::probe::{Probe, Sensor, Source};
 use super::problem::Problem;
 use super::solution::Solution;
+use super::touch::ToolLoad;
 
 /// Reading of a probe.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -38,7 +39,11 @@ impl Probe {
                 let moved = weights.iter().map(|&(n, w)| (x[n.index()] - rest[n.index()].coords) * w);
                 Reading::vector("displacement", "m", &moved.sum())
             }
-            Sensor::Force(support) => Reading::vector("force", "N", &problem.support_force(*support, x)),
+            Sensor::Force(source) => Reading::vector("force", "N", &wrench(problem, solution, *source).force),
+            Sensor::Moment(source, about) => {
+                let wrench = wrench(problem, solution, *source);
+                Reading::vector("moment", "N m", &(wrench.moment - about.coords.cross(&wrench.force)))
+            }
             Sensor::Volume => {
                 let value = Value::Scalar(problem.solid().volume(x));
                 Reading { quantity: "volume", unit: "m3", value }
@@ -46,6 +51,23 @@ impl Probe {
             Sensor::Stress(hex, xi) => Reading::tensor(&problem.solid().cauchy_stress(x, *hex, *xi)),
         }
     }
+}
+
+/// Force and moment about the origin that a support or a tool exerts on the body.
+fn wrench(problem: &Problem, solution: &Solution, source: Source) -> ToolLoad {
+    let support = match source {
+        Source::Tool(tool) => return solution.tool_loads[tool],
+        Source::Support(support) => support,
+    };
+    let x = solution.positions();
+    let holding = problem.holding_forces(x, solution.share, &solution.contact_forces);
+    let mut sum = ToolLoad::default();
+    let rows = &problem.supports()[support].rows;
+    for ((node, _), force) in rows.iter().zip(problem.support_forces(support, &holding)) {
+        sum.force += force;
+        sum.moment += x[node.index()].cross(&force);
+    }
+    sum
 }
 
 impl Reading {

@@ -2,7 +2,10 @@
 
 use nalgebra::Vector3;
 use plica_accurate::Info;
+use plica_accurate::contact::ContactInfo;
 use serde::Serialize;
+
+use super::touch::ToolLoad;
 
 /// A converged load step.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -21,10 +24,44 @@ pub struct LoadStep {
     pub smallest_jacobian: Option<f64>,
 }
 
+/// Stability of an equilibrium, by the signs of its tangent's eigenvalues.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stability {
+    /// No eigenvalue is negative.
+    Stable,
+    /// So many are negative.
+    Unstable(usize),
+    /// The tangent is too near to a singular matrix to tell.
+    Unknown,
+}
+
+impl Stability {
+    pub(super) fn new(n_negative: Option<usize>) -> Self {
+        match n_negative {
+            Some(0) => Self::Stable,
+            Some(n) => Self::Unstable(n),
+            None => Self::Unknown,
+        }
+    }
+}
+
 /// An equilibrium under all loads.
 #[derive(Debug, Clone)]
 pub struct Solution {
     pub(super) x: Vec<Vector3<f64>>,
+    /// Share of the loads that the body bears: 1 but at the end of an arc length.
+    pub share: f64,
+    /// Whether the equilibrium is stable.
+    pub stability: Stability,
+    /// Unstable equilibria that were left along their softest mode.
+    pub n_left: u32,
+    /// Shares of the loads at which these turned, by a parabola through three steps: limit points of an arc length.
+    pub limit_loads: Vec<f64>,
+    /// Load of each tool on the body.
+    pub(super) tool_loads: Vec<ToolLoad>,
+    /// Force of all tools on each node; empty without tools \[N\].
+    pub(super) contact_forces: Vec<Vector3<f64>>,
     /// Converged load steps.
     pub steps: Vec<LoadStep>,
     /// Load steps that failed and were halved.
@@ -61,5 +98,17 @@ impl LoadStep {
     pub(super) fn new(load: f64, info: Info) -> Self {
         let Info { residuals, iterations, indefinite_steps, halvings, smallest_jacobian, .. } = info;
         Self { load, iterations, indefinite_steps, halvings, residuals, smallest_jacobian }
+    }
+
+    /// A step with contact; its history is that of the last solve alone.
+    pub(super) fn of_contact(load: f64, info: &ContactInfo) -> Self {
+        Self {
+            load,
+            iterations: info.newton_iterations,
+            indefinite_steps: info.indefinite_steps,
+            halvings: info.failed_increments,
+            residuals: vec![info.residual],
+            smallest_jacobian: info.smallest_jacobian,
+        }
     }
 }
