@@ -2,18 +2,18 @@
 
 mod body;
 mod couple;
+mod face;
 mod pressure;
-mod quad;
 
-use nalgebra::Vector3;
-use plica_geometry::{HexMesh, NodeIdx};
+use nalgebra::{Point3, Vector3};
+use plica_geometry::{Face, HexMesh, NodeIdx};
 
 use crate::energy::{Energy, Projection};
 use crate::hessian::Hessian;
-pub use body::body_forces;
+pub use body::{body_forces, volume_forces};
 pub use couple::Couple;
+use face::{gauss_points, normal, positions};
 pub use pressure::Pressure;
-use quad::{QUAD_GAUSS_POINTS, corners, normal};
 
 /// Dead forces at nodes: `W = -sum_n f_n . x_n`.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,12 +65,21 @@ impl Traction {
     /// # Panics
     /// If a quad names a node that the mesh does not have.
     pub fn new(mesh: &HexMesh, quads: &[[NodeIdx; 4]], traction_pa: Vector3<f64>) -> Self {
-        let rest: Vec<_> = mesh.nodes().iter().map(|x| x.coords).collect();
-        let mut forces = Vec::with_capacity(4 * quads.len());
-        for quad in quads {
-            let corners = corners(&rest, quad);
-            for (a, &node) in quad.iter().enumerate() {
-                let area: f64 = QUAD_GAUSS_POINTS.iter().map(|q| q.shape[a] * normal(&corners, q).norm()).sum();
+        let faces: Vec<Face> = quads.iter().copied().map(Face::from).collect();
+        Self::on_faces(mesh.nodes(), &faces, traction_pa)
+    }
+
+    /// The same on faces of any elements, by their Gauss points; `nodes` \[m\] are those of the mesh at rest.
+    ///
+    /// # Panics
+    /// If a face names a node that there is not.
+    pub fn on_faces(nodes: &[Point3<f64>], faces: &[Face], traction_pa: Vector3<f64>) -> Self {
+        let rest: Vec<_> = nodes.iter().map(|x| x.coords).collect();
+        let mut forces = Vec::with_capacity(4 * faces.len());
+        for face in faces {
+            let (at, n_nodes) = (positions(&rest, face), face.nodes().len());
+            for (a, &node) in face.nodes().iter().enumerate() {
+                let area: f64 = gauss_points(face).iter().map(|q| q.shape[a] * normal(&at, n_nodes, q).norm()).sum();
                 forces.push((node, traction_pa * area));
             }
         }
@@ -81,6 +90,16 @@ impl Traction {
     pub fn total(&self) -> Vector3<f64> {
         self.nodal.total()
     }
+}
+
+/// Area of a face at rest \[m^2\], by its Gauss points; `nodes` \[m\] are those of the mesh.
+///
+/// # Panics
+/// If the face names a node that there is not.
+pub fn face_area(nodes: &[Point3<f64>], face: &Face) -> f64 {
+    let mut rest = [Vector3::zeros(); face::MAX_FACE_NODES];
+    rest.iter_mut().zip(face.nodes()).for_each(|(x, node)| *x = nodes[node.index()].coords);
+    gauss_points(face).iter().map(|q| normal(&rest, face.nodes().len(), q).norm()).sum()
 }
 
 impl Energy for Traction {

@@ -6,61 +6,12 @@
 
 mod contact;
 
-use std::f64::consts::PI;
+use contact::YOUNG_MODULUS_PA;
+use contact::quarter::{Quarter, graded};
+use plica_accurate::{Material, MaterialModel};
 
-use contact::{Body, Tool, YOUNG_MODULUS_PA, at, graded_block, quads};
-use plica_accurate::contact::ContactSurface;
-use plica_accurate::{Constraints, Material, MaterialModel};
-
-/// Coordinates from 0 to `end_m`: `n_fine` cells of `fine_m`, then `n_growing` that grow by one factor.
-fn graded(fine_m: f64, n_fine: usize, n_growing: usize, end_m: f64) -> Vec<f64> {
-    let rest = (end_m - fine_m * n_fine as f64) / fine_m;
-    let reach = |ratio: f64| (1..=n_growing as i32).map(|k| ratio.powi(k)).sum::<f64>();
-    let (mut low, mut high) = (0.1, 10.0);
-    for _ in 0..100 {
-        let middle = 0.5 * (low + high);
-        if reach(middle) < rest { low = middle } else { high = middle }
-    }
-    let sizes = (0..n_fine).map(|_| 1.0).chain((1..=n_growing as i32).map(|k| low.powi(k)));
-    let ends = sizes.scan(0.0, |end, size| {
-        *end += size * fine_m;
-        Some(*end)
-    });
-    std::iter::once(0.0).chain(ends).collect()
-}
-
-/// A quarter of a block with its top at z = 0 and its bottom held.
-struct Quarter {
-    body: Body,
-}
-
-impl Quarter {
-    fn new(across_m: &[f64], down_m: &[f64], poisson_ratio: f64, model: MaterialModel) -> Self {
-        let up: Vec<f64> = down_m.iter().rev().map(|d| -d).collect();
-        let mesh = graded_block([across_m, across_m, &up]);
-        let mut constraints = Constraints::none(mesh.n_nodes());
-        for (node, x) in mesh.nodes().iter().enumerate() {
-            (0..2).filter(|axis| x[*axis] == 0.0).for_each(|axis| constraints.give(node, axis, 0.0));
-            if x.z == up[0] {
-                constraints.hold(node, &x.coords);
-            }
-        }
-        let surface = ContactSurface::new(&mesh, &quads(&mesh, |x| x.z == 0.0));
-        let material = Material { model, young_modulus_pa: YOUNG_MODULUS_PA, poisson_ratio };
-        Self { body: Body::new(mesh, material, constraints, surface) }
-    }
-
-    /// Force \[N\] and contact radius \[m\] of the whole ball at each depth.
-    fn press(&mut self, radius_m: f64, depths_m: &[f64]) -> Vec<(f64, f64)> {
-        let mut tool = Tool::ball(radius_m, 0.0).exactly();
-        tool.params.max_increment_m = 0.1 * radius_m;
-        let mut state = self.body.rest(&at(0.0, 0.0, radius_m));
-        let mut press = |depth_m: &f64| {
-            let info = self.body.go_on(&tool, &[at(0.0, 0.0, radius_m - depth_m)], &mut state).unwrap();
-            (4.0 * info.force_n.z, (4.0 * info.area_m2 / PI).sqrt())
-        };
-        depths_m.iter().map(&mut press).collect()
-    }
+fn linear(poisson_ratio: f64) -> Material {
+    Material { model: MaterialModel::Linear, young_modulus_pa: YOUNG_MODULUS_PA, poisson_ratio }
 }
 
 /// `F = 4/3 E* sqrt(R) d^1.5`, `E* = E / (1 - nu^2)` \[Johnson85, eq. 4.23\].
@@ -88,7 +39,7 @@ fn hertz(n_fine: usize, n_growing: usize) {
     let depths_m = [0.025e-3, 0.05e-3, 0.1e-3, 0.2e-3];
     let contact_m = (radius_m * depths_m[3]).sqrt();
     let coordinates = graded(1.25 * contact_m / n_fine as f64, n_fine, n_growing, 100.0 * contact_m);
-    let mut quarter = Quarter::new(&coordinates, &coordinates, poisson_ratio, MaterialModel::Linear);
+    let mut quarter = Quarter::new(&coordinates, &coordinates, linear(poisson_ratio));
     let results = quarter.press(radius_m, &depths_m);
     println!("ball of 10 mm on a block of 100 contact radii, nu 0.3, {} hexahedra", quarter.body.mesh.n_hexes());
     for (depth_m, (force_n, contact_m)) in depths_m.iter().zip(&results) {
@@ -128,7 +79,7 @@ fn bonded_layer(n_fine: usize, n_growing: usize, n_down: usize) -> Vec<f64> {
         let fine_m = 1.25 * contact_m / n_fine as f64;
         let across = graded(fine_m, n_fine, n_growing, 8.0 * height_m);
         let down = graded(fine_m, 4, n_down - 4, height_m);
-        let mut quarter = Quarter::new(&across, &down, poisson_ratio, MaterialModel::Linear);
+        let mut quarter = Quarter::new(&across, &down, linear(poisson_ratio));
         let (force_n, _) = quarter.press(radius_m, &[depth_m])[0];
         let chi = contact_m / height_m;
         let over_hertz = force_n / hertz_n(radius_m, depth_m, poisson_ratio);

@@ -7,7 +7,9 @@ use common::derivatives::{gradient_of, hessian_of, smallest_eigenvalue};
 use common::random::Random;
 use common::{assert_close, distance, distorted_block, is_on_boundary, material, rest, sides, solve};
 use nalgebra::{Matrix3, Vector3};
-use plica_accurate::{Constraints, Energy, MaterialModel, Params, Pressure, Projection, Solid, SolveError, Traction};
+use plica_accurate::{
+    Constraints, Energy, Lame, Material, MaterialModel, Params, Pressure, Projection, Solid, SolveError, Traction,
+};
 use plica_geometry::shapes::block;
 
 const SIZE: [f64; 3] = [0.02, 0.02, 0.02];
@@ -42,31 +44,60 @@ fn stable_neo_hookean_is_finite_everywhere() {
     }
 }
 
+/// Laws with the logarithm of the volume.
+const WITH_LOGARITHM: [MaterialModel; 3] =
+    [MaterialModel::CompressibleNeoHookean, common::EXPONENTIAL, common::FIBRE_REINFORCED];
+
 #[test]
-fn compressible_neo_hookean_is_infinite_where_it_ends_and_large_before() {
+fn laws_with_a_logarithm_are_infinite_where_they_end_and_large_before() {
     let mesh = block(SIZE, [1, 1, 1]);
-    let solid = Solid::uniform(&mesh, material(MaterialModel::CompressibleNeoHookean, 3e4, 0.3)).unwrap();
-    for f in collapses().into_iter().filter(|f| f.determinant() <= 1e-12) {
-        assert_eq!(solid.value(&common::affine(&mesh, &f, &Vector3::zeros())), f64::INFINITY, "{f}");
-    }
-    let at = |stretch: f64| {
-        let f = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, stretch));
-        (solid.value(&common::affine(&mesh, &f, &Vector3::zeros())), material_at(&f))
-    };
-    let mut before = 0.0;
-    for stretch in [1e-1, 1e-3, 1e-6, 1e-12] {
-        let (value, density) = at(stretch);
-        assert_close(value, density * mesh.volume(), 1e-4, "energy");
-        assert!(value.is_finite() && value > before);
-        before = value;
+    for model in WITH_LOGARITHM {
+        let solid = Solid::uniform(&mesh, material(model, 3e4, 0.3)).unwrap();
+        for f in collapses().into_iter().filter(|f| f.determinant() <= 1e-12) {
+            let value = solid.value(&common::affine(&mesh, &f, &Vector3::zeros()));
+            assert_eq!(value, f64::INFINITY, "{model:?} {f}");
+        }
+        let at = |stretch: f64| {
+            let f = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, stretch));
+            (solid.value(&common::affine(&mesh, &f, &Vector3::zeros())), energy_density(&solid_material(model), &f))
+        };
+        let mut before = 0.0;
+        for stretch in [1e-1, 1e-3, 1e-6, 1e-12] {
+            let (value, density) = at(stretch);
+            assert_close(value, density * mesh.volume(), 1e-3, "energy");
+            assert!(value.is_finite() && value > before);
+            before = value;
+        }
     }
 }
 
-/// Energy density of the compressible material of the test above, straight from its definition.
-fn material_at(f: &Matrix3<f64>) -> f64 {
-    let lame = material(MaterialModel::CompressibleNeoHookean, 3e4, 0.3).lame();
+fn solid_material(model: MaterialModel) -> Material {
+    material(model, 3e4, 0.3)
+}
+
+/// Energy density of the materials of the test above, straight from their definitions.
+fn energy_density(material: &Material, f: &Matrix3<f64>) -> f64 {
+    let Lame { lambda_pa, mu_pa } = material.lame();
     let (j, i_c) = (f.determinant(), f.norm_squared());
-    lame.mu_pa / 2.0 * (i_c - 3.0) - lame.mu_pa * j.ln() + lame.lambda_pa / 4.0 * (j * j - 1.0 - 2.0 * j.ln())
+    let stretching = i_c - 3.0 - 2.0 * j.ln();
+    lambda_pa / 4.0 * (j * j - 1.0 - 2.0 * j.ln())
+        + match material.model {
+            MaterialModel::Exponential { exponent: b } => mu_pa / (2.0 * b) * ((b * stretching).exp() - 1.0),
+            MaterialModel::FibreReinforced(fibres) => {
+                let matrix_pa = mu_pa * (3.0 * lambda_pa + 2.0 * mu_pa) / (lambda_pa + mu_pa);
+                let stretch = (f * fibres.direction.normalize()).norm();
+                mu_pa / 2.0 * stretching + (fibres.young_modulus_pa - matrix_pa) / 2.0 * (stretch - 1.0).powi(2)
+            }
+            _ => mu_pa / 2.0 * stretching,
+        }
+}
+
+/// An exponential that overflows is an energy without bound, not NaN: the line search turns back from it.
+#[test]
+fn an_exponential_that_overflows_is_infinite() {
+    let stiff = material(MaterialModel::Exponential { exponent: 50.0 }, 3e4, 0.3);
+    assert_eq!(stiff.energy_density(&(Matrix3::identity() * 5.0)), f64::INFINITY);
+    assert_eq!(stiff.energy_density(&Matrix3::from_diagonal(&Vector3::new(5.0, 5.0, -5.0))), f64::INFINITY);
 }
 
 /// A dead pressure of several moduli: the first Newton step would invert the block.
@@ -88,7 +119,7 @@ fn line_search_recovers_from_steps_that_would_invert() {
         .collect();
     let pressure = 2e5;
     let load = Traction::new(&mesh, &top, Vector3::new(0.0, 0.0, -pressure));
-    for model in [MaterialModel::CompressibleNeoHookean, MaterialModel::StableNeoHookean] {
+    for model in [MaterialModel::CompressibleNeoHookean, MaterialModel::StableNeoHookean, common::EXPONENTIAL] {
         let material = material(model, 3e4, 0.3);
         let solid = Solid::uniform(&mesh, material).unwrap();
         let mut x = rest(&mesh);
@@ -161,7 +192,7 @@ fn follower_pressure_squeezes_evenly() {
         (0..3).filter(|&axis| sides(x, SIZE)[axis][0]).for_each(|axis| constraints.give(node, axis, x[axis]));
     }
     let load = Pressure::new(mesh.boundary_quads(), 2e4);
-    for model in [MaterialModel::CompressibleNeoHookean, MaterialModel::StableNeoHookean] {
+    for model in [MaterialModel::CompressibleNeoHookean, MaterialModel::StableNeoHookean, common::EXPONENTIAL] {
         let solid = Solid::uniform(&mesh, material(model, 3e4, 0.3)).unwrap();
         let mut x = rest(&mesh);
         let info = solve(&[&solid, &load], &constraints, &Params::default(), &mut x).unwrap();

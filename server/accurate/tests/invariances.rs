@@ -36,7 +36,7 @@ fn no_force_at_rest() {
 #[test]
 fn no_force_after_a_rigid_motion() {
     let b = Vector3::new(0.3, -0.2, 0.1);
-    for (model, angle) in MODELS.into_iter().zip([0.0, 2.5, 2.5]) {
+    for (model, angle) in MODELS.into_iter().zip([0.0, 2.5, 2.5, 2.5, 2.5]) {
         let turn = *Rotation3::from_axis_angle(&Unit::new_normalize(Vector3::new(1.0, 2.0, -1.0)), angle).matrix();
         let solid = Solid::uniform(&mesh(), material(model, E, 0.48)).unwrap();
         let forces = gradient_of(&solid, &affine(&mesh(), &turn, &b));
@@ -47,7 +47,7 @@ fn no_force_after_a_rigid_motion() {
 #[test]
 fn forces_and_their_moments_sum_to_nothing() {
     let mut random = Random::new(5);
-    for model in [MaterialModel::CompressibleNeoHookean, MaterialModel::StableNeoHookean] {
+    for model in MODELS.into_iter().filter(|model| *model != MaterialModel::Linear) {
         let solid = Solid::uniform(&mesh(), material(model, E, 0.45)).unwrap();
         let x = random.scatter(&rest(&mesh()), 2e-3);
         let mut forces = vec![Vector3::zeros(); x.len()];

@@ -1,11 +1,22 @@
 //! Materials as functions of the deformation gradient.
 
-use nalgebra::{Matrix3, SMatrix};
-use plica_accurate::{Material, MaterialModel, Projection};
+use nalgebra::{Matrix3, SMatrix, Vector3};
+use plica_accurate::{Fibres, Material, MaterialError, MaterialModel, Projection};
 use proptest::prelude::*;
 
-const MODELS: [MaterialModel; 3] =
-    [MaterialModel::Linear, MaterialModel::CompressibleNeoHookean, MaterialModel::StableNeoHookean];
+const FIBRES: Fibres = Fibres { young_modulus_pa: 1.5e5, direction: Vector3::new(1.0, 2.0, -1.0) };
+const MODELS: [MaterialModel; 5] = [
+    MaterialModel::Linear,
+    MaterialModel::CompressibleNeoHookean,
+    MaterialModel::StableNeoHookean,
+    MaterialModel::Exponential { exponent: 2.0 },
+    MaterialModel::FibreReinforced(FIBRES),
+];
+
+/// Whether the law ends at `J = 0`.
+fn is_infinite_inside_out(model: MaterialModel) -> bool {
+    !matches!(model, MaterialModel::Linear | MaterialModel::StableNeoHookean)
+}
 
 fn material(model: MaterialModel) -> Material {
     Material { model, young_modulus_pa: 3e4, poisson_ratio: 0.4 }
@@ -21,7 +32,7 @@ proptest! {
         let d = Matrix3::from_row_slice(&direction);
         for model in MODELS {
             let m = material(model);
-            if model == MaterialModel::CompressibleNeoHookean && f.determinant() < 0.1 {
+            if is_infinite_inside_out(model) && f.determinant() < 0.1 {
                 continue;
             }
             let h = 1e-5;
@@ -41,7 +52,7 @@ proptest! {
     fn projected_tangent_lifts_negative_eigenvalues_to_zero(f in any_gradient()) {
         for model in MODELS {
             let m = material(model);
-            if model == MaterialModel::CompressibleNeoHookean && f.determinant() < 0.1 {
+            if is_infinite_inside_out(model) && f.determinant() < 0.1 {
                 continue;
             }
             let exact = m.tangent(&f, Projection::Exact);
@@ -50,4 +61,30 @@ proptest! {
             prop_assert!(projected.symmetric_eigenvalues().min() >= -1e-12 * exact.norm());
         }
     }
+}
+
+#[test]
+fn parameters_of_a_law_are_checked() {
+    let with = |model| material(model).check();
+    for exponent in [0.0, -1.0, f64::INFINITY] {
+        assert_eq!(with(MaterialModel::Exponential { exponent }), Err(MaterialError::Exponent { exponent }));
+    }
+    let soft = Fibres { young_modulus_pa: 2.9e4, ..FIBRES };
+    let refused = Err(MaterialError::FibreModulus { along_pa: 2.9e4, across_pa: 3e4 });
+    assert_eq!(with(MaterialModel::FibreReinforced(soft)), refused);
+    let nowhere = Fibres { direction: Vector3::zeros(), ..FIBRES };
+    assert_eq!(
+        with(MaterialModel::FibreReinforced(nowhere)),
+        Err(MaterialError::FibreDirection { direction: [0.0; 3] })
+    );
+    assert_eq!(with(MaterialModel::FibreReinforced(FIBRES)), Ok(()));
+}
+
+/// Fibres no stiffer than what they lie in are not noticed at small strain.
+#[test]
+fn fibres_of_the_modulus_across_them_leave_the_matrix_isotropic() {
+    let fibres = Fibres { young_modulus_pa: 3e4, ..FIBRES };
+    let reinforced = material(MaterialModel::FibreReinforced(fibres)).tangent(&Matrix3::identity(), Projection::Exact);
+    let plain = material(MaterialModel::CompressibleNeoHookean).tangent(&Matrix3::identity(), Projection::Exact);
+    assert!((reinforced - plain).amax() <= 1e-10 * plain.amax());
 }

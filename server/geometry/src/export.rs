@@ -4,7 +4,7 @@ mod glb;
 mod vtu;
 
 pub use glb::{glb_bytes, write_glb};
-pub use vtu::{Field, write_vtu};
+pub use vtu::{Field, write_volume_vtu, write_vtu};
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ pub enum ExportError {
         /// Cause.
         cause: std::io::Error,
     },
-    /// A field does not hold one value per node or hexahedron.
+    /// A field does not hold one value per node or element.
     #[error("field `{name}` holds {n_values} values for {n_expected} {of}")]
     FieldLength {
         /// The field.
@@ -28,7 +28,7 @@ pub enum ExportError {
         n_values: usize,
         /// Number of values needed.
         n_expected: usize,
-        /// Nodes or hexahedra.
+        /// Nodes or elements.
         of: &'static str,
     },
     /// The VTK writer refused the data.

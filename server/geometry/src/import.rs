@@ -1,4 +1,4 @@
-//! Mesh files of hexahedra with their named groups: VTU as ParaView and meshio write it, Gmsh's MSH 4.1 and 2.2.
+//! Mesh files of hexahedra or tetrahedra with their named groups: VTU as ParaView and meshio write it, Gmsh's MSH 4.1 and 2.2.
 //!
 //! Both readers are written here: the crates for these formats either know no physical names and no MSH 2.2, or no raw
 //! appended VTU data, and end the program on a truncated file. A file of any bytes gives a mesh or an [`ImportError`].
@@ -19,20 +19,21 @@ use std::path::Path;
 
 pub use error::{ImportError, Place};
 pub use groups::{Group, Groups};
-pub use named_mesh::NamedMesh;
+pub use named_mesh::{CellVectors, NamedMesh};
 pub use obj::{ObjPart, parse_obj_parts};
 pub use options::ReadOptions;
 
 use error::{Fault, fault};
 
-/// Reads a `.vtu` or `.msh` file of 8-node hexahedra.
+/// Reads a `.vtu` or `.msh` file of 8-node hexahedra, 4-node or 10-node tetrahedra.
 ///
 /// Groups are the physical groups of Gmsh, by name or, without one, by number. In a VTU file a cell array with at most 256
 /// different values makes a group `NAME=VALUE` of each, and so does a point array, of nodes. Cells of lower dimension (points,
-/// lines, triangles, quads) lend their nodes to groups; quads that are faces of hexahedra are faces of the group too.
+/// lines, triangles, quads) lend their nodes to groups; those that are faces of elements are faces of the group too. Cell arrays
+/// of three components are kept as vectors.
 ///
 /// # Errors
-/// [`ImportError`]: a file that cannot be read, is damaged, holds other volumes than 8-node hexahedra, or has parts that touch
+/// [`ImportError`]: a file that cannot be read, is damaged, holds other or several kinds of volumes, or has parts that touch
 /// without sharing nodes.
 pub fn read_mesh(path: &Path, options: ReadOptions) -> Result<NamedMesh, ImportError> {
     let bytes = std::fs::read(path).map_err(|e| {

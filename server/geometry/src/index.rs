@@ -41,6 +41,10 @@ index_type! {
     HexIdx
 }
 index_type! {
+    /// An element of a [`VolumeMesh`](crate::VolumeMesh).
+    ElementIdx
+}
+index_type! {
     /// A vertex of a [`Skin`](crate::Skin), and the row of an [`Embedding`](crate::Embedding) that belongs to it.
     VertexIdx
 }

@@ -11,6 +11,9 @@ mod hinges;
 use nalgebra::Point3;
 
 use crate::hex_mesh::HexMesh;
+use crate::index::ElementIdx;
+use crate::tet_mesh::TetMesh;
+use crate::volume_mesh::VolumeMesh;
 use faces::Boundary;
 
 /// Points of a mesh of one kind of trouble.
@@ -50,6 +53,25 @@ pub struct Joints {
 }
 
 impl Joints {
+    /// Looks through a mesh of any elements: of tetrahedra for nodes at one place, of hexahedra for everything.
+    pub fn of_volume(mesh: &VolumeMesh) -> Self {
+        match mesh {
+            VolumeMesh::Hexahedra(mesh) => Self::find(mesh),
+            VolumeMesh::Tetrahedra(mesh) => {
+                let sizes = shortest_distances(mesh);
+                let twins = grid::coincident(mesh.nodes(), &sizes);
+                let at_node = |node: &u32| mesh.nodes()[*node as usize];
+                Self {
+                    coincident: Sites::around(twins.firsts.iter().map(at_node)),
+                    widest_gap_m: twins.widest_gap_m,
+                    shortest_edge_m: sizes.iter().copied().fold(f64::INFINITY, f64::min),
+                    n_parts: 1,
+                    ..Self::default()
+                }
+            }
+        }
+    }
+
     /// Looks through a mesh; time and memory grow with the number of hexahedra, not with its square.
     ///
     /// Nodes at one point are reported, and count as one for everything else.
@@ -84,6 +106,21 @@ impl Sites {
             Some(Self { n: n + 1, first, lower: lower.inf(&x), upper: upper.sup(&x) })
         })
     }
+}
+
+/// Shortest distance between two nodes of the tetrahedra around each node \[m\].
+fn shortest_distances(mesh: &TetMesh) -> Vec<f64> {
+    let mut sizes = vec![f64::INFINITY; mesh.n_nodes()];
+    for tet in (0..mesh.n_tets()).map(ElementIdx::from_index) {
+        let x = mesh.positions_of(tet);
+        let pairs = (1..x.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
+        let shortest = pairs.map(|(a, b)| (x[a] - x[b]).norm()).fold(f64::INFINITY, f64::min);
+        for node in mesh.nodes_of(tet) {
+            let size = &mut sizes[node.index()];
+            *size = size.min(shortest);
+        }
+    }
+    sizes
 }
 
 /// Shortest edge of the hexahedra around each node \[m\].

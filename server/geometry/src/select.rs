@@ -1,11 +1,12 @@
-//! Parts of a mesh: nodes, boundary faces or hexahedra by box, face of the bounding box, group or condition.
+//! Parts of a mesh: nodes, boundary faces or elements by box, face of the bounding box, group or condition.
 
 use nalgebra::Point3;
 
-use crate::hex_mesh::HexMesh;
+use crate::face::Face;
 use crate::import::{Group, Groups};
-use crate::index::{HexIdx, NodeIdx};
+use crate::index::{ElementIdx, NodeIdx};
 use crate::predicate::Predicate;
+use crate::volume_mesh::{ElementKind, VolumeMesh};
 
 /// Tolerance of a face of the bounding box, as a share of the box's diagonal.
 const FACE_TOLERANCE: f64 = 1e-6;
@@ -15,13 +16,13 @@ const BOX_TOLERANCE: f64 = 1e-9;
 /// Conditions that must all hold.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selector {
-    /// A box by its lower and upper corner \[m\]: nodes in it; faces and hexahedra whose centre is in it.
+    /// A box by its lower and upper corner \[m\]: nodes in it; faces and elements whose centre is in it.
     pub within: Option<[Point3<f64>; 2]>,
     /// A face of the mesh's bounding box, by axis and end: nodes on it; faces with all corners on it.
     pub side: Option<Side>,
-    /// A named group: its nodes, quads or hexahedra; where a group has no quads, faces with all corners in it.
+    /// A named group: its nodes, faces or elements; where a group has no faces, those with all corners in it.
     pub group: Option<String>,
-    /// A condition on nodes, or on the centres of faces and hexahedra.
+    /// A condition on nodes, or on the centres (means of the corners) of faces and elements.
     pub condition: Option<Predicate>,
 }
 
@@ -45,11 +46,13 @@ pub enum SelectError {
         /// Names in the mesh.
         known: Vec<String>,
     },
-    /// The group has no hexahedra.
-    #[error("group `{name}` has no hexahedra: it is a group of {}", ["points", "curves", "faces"][usize::from(*dimension)])]
+    /// The group has no volumes.
+    #[error("group `{name}` has no {kind}: it is a group of {}", ["points", "curves", "faces"][usize::from(*dimension)])]
     NoVolume {
         /// The name.
         name: String,
+        /// Kind of the mesh's elements.
+        kind: &'static str,
         /// Dimension of the group, 0 to 2.
         dimension: u8,
     },
@@ -72,7 +75,7 @@ impl Selector {
     ///
     /// # Errors
     /// [`SelectError`].
-    pub fn nodes(&self, mesh: &HexMesh, groups: &Groups) -> Result<Vec<NodeIdx>, SelectError> {
+    pub fn nodes(&self, mesh: &VolumeMesh, groups: &Groups) -> Result<Vec<NodeIdx>, SelectError> {
         let frame = Frame::new(mesh);
         let group = self.group(groups, Groups::nodes)?;
         let in_group = |node: NodeIdx| group.is_none_or(|group| group.nodes.binary_search(&node).is_ok());
@@ -87,36 +90,39 @@ impl Selector {
     ///
     /// # Errors
     /// [`SelectError`].
-    pub fn faces(&self, mesh: &HexMesh, groups: &Groups) -> Result<Vec<[NodeIdx; 4]>, SelectError> {
+    pub fn faces(&self, mesh: &VolumeMesh, groups: &Groups) -> Result<Vec<Face>, SelectError> {
         let frame = Frame::new(mesh);
         let group = self.group(groups, |groups, name| groups.surface(name).or_else(|| groups.nodes(name)))?;
-        let quads = mesh.boundary_quads();
-        let n = quads.len();
-        let selected = quads.into_iter().filter(|quad| {
-            let corners = quad.map(|node| mesh.nodes()[node.index()]);
+        let faces = mesh.boundary_faces();
+        let n = faces.len();
+        let selected = faces.into_iter().filter(|face| {
+            let corners: Vec<_> = face.corners().iter().map(|node| mesh.nodes()[node.index()]).collect();
             let is_on_side = self.side.is_none_or(|side| corners.iter().all(|x| frame.is_on(side, x)));
-            is_on_side && group.is_none_or(|group| has_face(group, quad)) && self.holds_at(&frame, &mean(&corners))
+            is_on_side && group.is_none_or(|group| has_face(group, face)) && self.holds_at(&frame, &mean(&corners))
         });
         not_empty(selected.collect(), n, "boundary faces")
     }
 
-    /// Hexahedra, in increasing order; at least one. A side of the bounding box selects those with a face on it.
+    /// Elements, in increasing order; at least one. A side of the bounding box selects those with a face on it.
     ///
     /// # Errors
     /// [`SelectError`].
-    pub fn hexes(&self, mesh: &HexMesh, groups: &Groups) -> Result<Vec<HexIdx>, SelectError> {
+    pub fn elements(&self, mesh: &VolumeMesh, groups: &Groups) -> Result<Vec<ElementIdx>, SelectError> {
         let frame = Frame::new(mesh);
+        let kind = mesh.kind();
         let group = self.group(groups, |groups, name| groups.volume(name).or_else(|| groups.nodes(name)))?;
         if let Some(Group { name, dimension: dimension @ 0..=2, .. }) = group {
-            return Err(SelectError::NoVolume { name: name.clone(), dimension: *dimension });
+            return Err(SelectError::NoVolume { name: name.clone(), kind: kind.plural(), dimension: *dimension });
         }
-        let hexes = mesh.hex_indices().filter(|&hex| {
-            let corners = mesh.corner_positions(hex);
-            let is_on_side = self.side.is_none_or(|side| corners.iter().filter(|x| frame.is_on(side, x)).count() >= 4);
-            let in_group = group.is_none_or(|group| group.hexes.binary_search(&hex).is_ok());
+        let n_of_face = if kind == ElementKind::Hexahedron { 4 } else { 3 };
+        let elements = mesh.elements().filter(|&element| {
+            let corners = mesh.corners_of(element);
+            let n_on = |side| corners.iter().filter(|x| frame.is_on(side, x)).count();
+            let is_on_side = self.side.is_none_or(|side| n_on(side) >= n_of_face);
+            let in_group = group.is_none_or(|group| group.elements.binary_search(&element).is_ok());
             is_on_side && in_group && self.holds_at(&frame, &mean(&corners))
         });
-        not_empty(hexes.collect(), mesh.n_hexes(), "hexahedra")
+        not_empty(elements.collect(), mesh.n_elements(), kind.plural())
     }
 
     /// Box and condition at a point.
@@ -144,13 +150,11 @@ fn not_empty<T>(selected: Vec<T>, n: usize, of: &'static str) -> Result<Vec<T>, 
     if selected.is_empty() { Err(SelectError::Empty { n, of }) } else { Ok(selected) }
 }
 
-fn has_face(group: &Group, quad: &[NodeIdx; 4]) -> bool {
+fn has_face(group: &Group, face: &Face) -> bool {
     if group.faces.is_empty() {
-        return quad.iter().all(|node| group.nodes.binary_search(node).is_ok());
+        return face.corners().iter().all(|node| group.nodes.binary_search(node).is_ok());
     }
-    let mut sorted = *quad;
-    sorted.sort_unstable();
-    group.faces.binary_search(&sorted).is_ok()
+    group.faces.binary_search(&face.sorted_corners()).is_ok()
 }
 
 fn mean(points: &[Point3<f64>]) -> Point3<f64> {
@@ -164,7 +168,7 @@ struct Frame {
 }
 
 impl Frame {
-    fn new(mesh: &HexMesh) -> Self {
+    fn new(mesh: &VolumeMesh) -> Self {
         let [lower, upper] = mesh.bounds();
         Self { lower, upper }
     }

@@ -18,7 +18,7 @@ fn read(bytes: &[u8]) -> Result<NamedMesh, String> {
 
 fn check_bar(name: &str, bytes: &[u8]) -> NamedMesh {
     let read = read(bytes).unwrap_or_else(|e| panic!("{name}: {e}"));
-    assert_eq!((read.mesh.n_nodes(), read.mesh.n_hexes()), (45, 16), "{name}");
+    assert_eq!((read.mesh.n_nodes(), read.mesh.n_elements()), (45, 16), "{name}");
     assert!((read.mesh.volume() - 16e-6).abs() < 1e-15, "{name}");
     read
 }
@@ -68,7 +68,7 @@ fn cells_that_another_piece_owns_are_left_to_it_and_groups_span_pieces() {
         piece(&[bar], 12, &cell_data("material", &[1, 1, 1, 1, material, material, material, material]))
     });
     let read = check_bar("groups", file(&format!("{left}{right}")).as_bytes());
-    let n_hexes = |name: &str| read.groups.volume(name).unwrap().hexes.len();
+    let n_hexes = |name: &str| read.groups.volume(name).unwrap().elements.len();
     assert_eq!((n_hexes("material=1"), n_hexes("material=2")), (12, 4));
 }
 

@@ -11,7 +11,7 @@ use common::{Random, centre, default_wedge};
 use nalgebra::Point3;
 use plica_geometry::export::{Field, write_vtu};
 use plica_geometry::import::{ImportError, NamedMesh, ReadOptions, parse_mesh, read_mesh};
-use plica_geometry::{HexIdx, NodeIdx};
+use plica_geometry::{ElementIdx, NodeIdx, VolumeMesh};
 
 const MILLIMETRES: f64 = 1e-3;
 
@@ -47,7 +47,7 @@ fn rounded(mesh: &NamedMesh, nodes: &[NodeIdx]) -> Vec<[i32; 3]> {
 }
 
 fn check_boxes(read: &NamedMesh) {
-    assert_eq!((read.mesh.n_hexes(), read.mesh.n_nodes()), (16, 45));
+    assert_eq!((read.mesh.n_elements(), read.mesh.n_nodes()), (16, 45));
     assert!((read.mesh.volume() - 2e-6).abs() < 1e-17, "{}", read.mesh.volume());
 }
 
@@ -56,8 +56,8 @@ fn nodes_where(read: &NamedMesh, keep: impl Fn(&Point3<f64>) -> bool) -> Vec<Nod
     nodes.map(|(node, _)| NodeIdx::from_index(node)).collect()
 }
 
-fn hexes_where(read: &NamedMesh, keep: impl Fn(Point3<f64>) -> bool) -> Vec<HexIdx> {
-    read.mesh.hex_indices().filter(|&hex| keep(centre(&read.mesh, hex))).collect()
+fn hexes_where(read: &NamedMesh, keep: impl Fn(Point3<f64>) -> bool) -> Vec<ElementIdx> {
+    read.mesh.elements().filter(|&element| keep(read.mesh.centre_of(element))).collect()
 }
 
 #[test]
@@ -68,8 +68,8 @@ fn gmsh_files_of_every_kind_give_the_same_mesh_and_groups() {
         let read = read_mesh(&data(&name), ReadOptions::unit(MILLIMETRES)).unwrap();
         check_boxes(&read);
         let groups = &read.groups;
-        assert_eq!(groups.volume("soft").unwrap().hexes, hexes_where(&read, |c| c.x < 0.01), "{name}");
-        assert_eq!(groups.volume("stiff").unwrap().hexes, hexes_where(&read, |c| c.x > 0.01), "{name}");
+        assert_eq!(groups.volume("soft").unwrap().elements, hexes_where(&read, |c| c.x < 0.01), "{name}");
+        assert_eq!(groups.volume("stiff").unwrap().elements, hexes_where(&read, |c| c.x > 0.01), "{name}");
         assert_eq!(groups.surface("bottom").unwrap().nodes, nodes_where(&read, |x| x.z.abs() < 1e-9), "{name}");
         assert_eq!(groups.surface("bottom").unwrap().faces.len(), 8, "{name}");
         assert_eq!(groups.surface("end").unwrap().nodes, nodes_where(&read, |x| x.x > 0.02 - 1e-9), "{name}");
@@ -85,8 +85,7 @@ fn gmsh_files_of_every_kind_give_the_same_mesh_and_groups() {
 #[test]
 fn faces_of_a_surface_are_boundary_quads() {
     let read = read_mesh(&data("boxes-4.1-ascii.msh"), ReadOptions::unit(MILLIMETRES)).unwrap();
-    let mut boundary = read.mesh.boundary_quads();
-    boundary.iter_mut().for_each(|quad| quad.sort_unstable());
+    let boundary: Vec<_> = read.mesh.boundary_faces().iter().map(|face| face.sorted_corners()).collect();
     for name in ["bottom", "end", "77"] {
         assert!(read.groups.surface(name).unwrap().faces.iter().all(|face| boundary.contains(face)), "{name}");
     }
@@ -100,8 +99,8 @@ fn vtu_files_of_every_kind_give_the_same_mesh_and_groups() {
         let read = read_mesh(&data(&name), ReadOptions::unit(MILLIMETRES)).unwrap_or_else(|e| panic!("{e}"));
         check_boxes(&read);
         let groups = &read.groups;
-        assert_eq!(groups.volume("material=1").unwrap().hexes, hexes_where(&read, |c| c.x < 0.01), "{name}");
-        assert_eq!(groups.volume("stiffness=1").unwrap().hexes, hexes_where(&read, |c| c.x > 0.01), "{name}");
+        assert_eq!(groups.volume("material=1").unwrap().elements, hexes_where(&read, |c| c.x < 0.01), "{name}");
+        assert_eq!(groups.volume("stiffness=1").unwrap().elements, hexes_where(&read, |c| c.x > 0.01), "{name}");
         assert_eq!(groups.surface("material=3").unwrap().faces.len(), 8, "{name}");
         assert_eq!(groups.nodes("fixed=1").unwrap().nodes, nodes_where(&read, |x| x.z == 0.0), "{name}");
         assert!(groups.iter().all(|group| !group.name.starts_with("position")), "{name}");
@@ -116,15 +115,14 @@ fn what_is_written_is_read_back() {
     let region: Vec<f64> = mesh.hex_indices().map(|hex| f64::from(u8::from(centre(&mesh, hex).x > 0.06))).collect();
     write_vtu(&path, &mesh, &[], &[Field::Scalars("region", &region)]).unwrap();
     let read = read_mesh(&path, ReadOptions::unit(1.0)).unwrap();
-    assert_eq!(read.mesh, mesh);
-    assert_eq!(read.groups.volume("region=1").unwrap().hexes, hexes_where(&read, |c| c.x > 0.06));
+    assert_eq!(read.mesh, VolumeMesh::from(mesh));
+    assert_eq!(read.groups.volume("region=1").unwrap().elements, hexes_where(&read, |c| c.x > 0.06));
 }
 
 #[test]
 fn other_elements_are_refused_by_name() {
     for (name, parts) in [
         ("second-order.msh", &["27-node hexahedra (second order)", "Mesh.ElementOrder = 1"][..]),
-        ("tetrahedra.msh", &["4-node tetrahedra", "8-node hexahedra", "Recombine"]),
         ("boxes-lzma.vtu", &["compressor", "vtkLZMADataCompressor", "save it with ZLib"]),
         ("make.py", &["neither", "meshio convert"]),
         ("none.msh", &["cannot be read", "check the path"]),
@@ -147,7 +145,7 @@ fn a_surface_is_told_to_be_one() {
     let text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n3\n1 0 0 0\n2 1 0 0\n3 0 1 0\n$EndNodes\n\
                 $Elements\n1\n1 2 2 0 1 1 2 3\n$EndElements\n";
     let message = parse(text).unwrap_err().to_string();
-    assert!(message.contains("1 triangles or quads and no hexahedra: it is a surface"), "{message}");
+    assert!(message.contains("1 triangles or quads and no hexahedra or tetrahedra: it is a surface"), "{message}");
 }
 
 /// Errors in text files carry the line.
@@ -195,7 +193,7 @@ fn a_missing_node_and_a_twisted_hexahedron_are_named() {
     };
     let read = parse(&cube("31 5 2 4 1 1 2 3 4 5 6 7 8")).unwrap();
     assert!((read.mesh.volume() - 1.0).abs() < 1e-15);
-    assert_eq!(read.groups.volume("4").unwrap().hexes, [HexIdx(0)]);
+    assert_eq!(read.groups.volume("4").unwrap().elements, [ElementIdx(0)]);
     let message = parse(&cube("31 5 2 4 1 1 2 3 4 5 6 7 9")).unwrap_err().to_string();
     assert!(message.contains("a.mesh:17: element 31 names node 9"), "{message}");
     let message = parse(&cube("31 5 2 4 1 5 6 7 8 1 2 3 4")).unwrap_err().to_string();
@@ -211,8 +209,8 @@ fn a_hexahedron_of_two_groups_is_one() {
     let text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n9\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 0 0 1\n6 1 0 1\n7 1 1 1\n\
                 8 0 1 1\n99 5 5 5\n$EndNodes\n$Elements\n2\n1 5 2 1 1 1 2 3 4 5 6 7 8\n2 5 2 2 1 1 2 3 4 5 6 7 8\n$EndElements\n";
     let read = parse(text).unwrap();
-    assert_eq!((read.mesh.n_hexes(), read.mesh.n_nodes()), (1, 8), "and the node of no hexahedron is left out");
-    assert_eq!(read.groups.volume("1").unwrap().hexes, read.groups.volume("2").unwrap().hexes);
+    assert_eq!((read.mesh.n_elements(), read.mesh.n_nodes()), (1, 8), "and the node of no hexahedron is left out");
+    assert_eq!(read.groups.volume("1").unwrap().elements, read.groups.volume("2").unwrap().elements);
 }
 
 #[test]

@@ -88,7 +88,7 @@ fn parts_that_touch_without_sharing_nodes_are_refused_with_number_and_place() {
 #[test]
 fn coincident_nodes_are_merged_where_that_is_asked_for() {
     let merged = read(&halves([2; 3], [2; 3]), Some(1e-6)).unwrap();
-    assert_eq!((merged.mesh.n_nodes(), merged.mesh.n_hexes()), (45, 16));
+    assert_eq!((merged.mesh.n_nodes(), merged.mesh.n_elements()), (45, 16));
     assert!(merged.remarks[0].contains("9 nodes were merged"), "{:?}", merged.remarks);
     assert_eq!(merged.remarks.len(), 1);
     // 0.01 mm apart: a smaller tolerance leaves them, and says so.
@@ -96,7 +96,7 @@ fn coincident_nodes_are_merged_where_that_is_asked_for() {
     assert!(read(&gap, Some(1e-6)).unwrap_err().contains("at 9 points several nodes"));
     assert_eq!(read(&gap, Some(2e-5)).unwrap().mesh.n_nodes(), 45);
     let too_much = read(&halves([2; 3], [2; 3]), Some(0.012)).unwrap_err();
-    assert!(too_much.contains("two corners of a hexahedron, which are 1e-2 m apart"), "{too_much}");
+    assert!(too_much.contains("two nodes of a hexahedron, which are 1e-2 m apart"), "{too_much}");
     // Every hexahedron with nodes of its own, as a discontinuous field is written.
     let cubes: Vec<Bar> = (0..27)
         .map(|i| [i % 3, i / 3 % 3, i / 9].map(f64::from))

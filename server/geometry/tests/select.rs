@@ -7,11 +7,11 @@ use std::path::Path;
 
 use common::default_wedge;
 use nalgebra::Point3;
-use plica_geometry::HexIdx;
 use plica_geometry::import::{Groups, NamedMesh, ReadOptions, read_mesh};
 use plica_geometry::predicate::Predicate;
 use plica_geometry::select::{SelectError, Selector, Side};
 use plica_geometry::shapes::{Hexahedron, block, hexahedron, wedge};
+use plica_geometry::{ElementIdx, VolumeMesh};
 use proptest::prelude::*;
 
 fn holds(text: &str, x: [f64; 3]) -> bool {
@@ -98,24 +98,27 @@ fn side(axis: usize, upper: bool) -> Selector {
 
 #[test]
 fn sides_boxes_and_conditions_select_together() {
-    let (mesh, none) = (block([4.0, 3.0, 2.0], [4, 3, 2]), Groups::default());
+    let (mesh, none) = (VolumeMesh::from(block([4.0, 3.0, 2.0], [4, 3, 2])), Groups::default());
     assert_eq!(side(2, true).nodes(&mesh, &none).unwrap().len(), 20);
     assert_eq!(side(2, true).faces(&mesh, &none).unwrap().len(), 12);
-    assert_eq!(side(0, false).hexes(&mesh, &none).unwrap().len(), 6);
+    assert_eq!(side(0, false).elements(&mesh, &none).unwrap().len(), 6);
     let quarter = Selector { condition: Some(Predicate::parse("x > 2 && y > 2").unwrap()), ..side(2, true) };
     assert_eq!(quarter.faces(&mesh, &none).unwrap().len(), 2, "by centres");
     assert_eq!(quarter.nodes(&mesh, &none).unwrap().len(), 2, "by positions, the border excluded");
     let corners = [Point3::new(0.0, 0.0, 0.0), Point3::new(1.0, 1.0, 1.0)];
     let corner = Selector { within: Some(corners), ..Selector::default() };
     assert_eq!(corner.nodes(&mesh, &none).unwrap().len(), 8, "the border belongs to a box");
-    assert_eq!(corner.hexes(&mesh, &none).unwrap(), [HexIdx(0)]);
+    assert_eq!(corner.elements(&mesh, &none).unwrap(), [ElementIdx(0)]);
     assert_eq!(corner.faces(&mesh, &none).unwrap().len(), 3);
     let nothing = Selector { within: Some(corners), ..side(2, true) };
     assert_eq!(nothing.nodes(&mesh, &none), Err(SelectError::Empty { n: 60, of: "nodes" }));
     for axis in 0..3 {
         let outward = side(axis, true).faces(&mesh, &none).unwrap();
         let x = |node: plica_geometry::NodeIdx| mesh.nodes()[node.index()];
-        assert!(outward.iter().all(|&[a, b, c, _]| (x(b) - x(a)).cross(&(x(c) - x(b)))[axis] > 0.0));
+        assert!(outward.iter().all(|face| {
+            let [a, b, c, _] = face.nodes() else { return false };
+            (x(*b) - x(*a)).cross(&(x(*c) - x(*b)))[axis] > 0.0
+        }));
     }
 }
 
@@ -132,13 +135,13 @@ fn groups_select_nodes_faces_and_hexahedra() {
     let NamedMesh { mesh, groups, .. } = boxes("boxes-4.1-ascii.msh");
     assert_eq!(group("bottom").nodes(&mesh, &groups).unwrap().len(), 15);
     assert_eq!(group("bottom").faces(&mesh, &groups).unwrap().len(), 8);
-    assert_eq!(group("soft").hexes(&mesh, &groups).unwrap().len(), 8);
+    assert_eq!(group("soft").elements(&mesh, &groups).unwrap().len(), 8);
     assert_eq!(group("soft").faces(&mesh, &groups).unwrap().len(), 5 * 4, "its boundary, less the common face");
     let both = Selector { group: Some("bottom".to_owned()), ..side(0, false) };
     assert_eq!(both.nodes(&mesh, &groups).unwrap().len(), 3);
     let error = group("top").nodes(&mesh, &groups).unwrap_err().to_string();
     assert_eq!(error, "no group `top`; the mesh has `corner`, `edge`, `bottom`, `77`, `end`, `soft`, `stiff`");
-    let error = group("bottom").hexes(&mesh, &groups).unwrap_err().to_string();
+    let error = group("bottom").elements(&mesh, &groups).unwrap_err().to_string();
     assert_eq!(error, "group `bottom` has no hexahedra: it is a group of faces");
     assert_eq!(group("edge").faces(&mesh, &groups), Err(SelectError::Empty { n: 40, of: "boundary faces" }));
     let NamedMesh { mesh, groups, .. } = boxes("boxes-appended-raw.vtu");

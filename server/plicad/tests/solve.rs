@@ -143,8 +143,8 @@ fn the_same_bar_from_mesh_files_with_groups() {
     check_bar(&solve(&bar(&file("boxes-4.1-binary.msh"), "{ group = \"stiff\" }", wall, "{ group = \"end\" }")));
     let vtu = file("boxes-appended-raw-zlib.vtu");
     check_bar(&solve(&bar(&vtu, "{ group = \"material=2\" }", wall, "{ face = \"x_max\" }")));
-    let message = refusal(&bar(&file("tetrahedra.msh"), "{ group = \"stiff\" }", wall, "{ group = \"end\" }"));
-    assert!(message.contains("case.toml:3: mesh.file") && message.contains("4-node tetrahedra"), "{message}");
+    let message = refusal(&bar(&file("second-order.msh"), "{ group = \"stiff\" }", wall, "{ group = \"end\" }"));
+    assert!(message.contains("case.toml:3: mesh.file") && message.contains("27-node hexahedra"), "{message}");
 }
 
 /// A rubber block between two plates that do not let it slip, squeezed by a displacement; symmetric, so the plates' forces cancel.
@@ -266,7 +266,7 @@ fn the_result_is_a_file_for_paraview() {
     }
     let mesh =
         plica_geometry::import::read_mesh(Path::new(out), plica_geometry::import::ReadOptions::unit(1.0)).unwrap();
-    assert_eq!((mesh.mesh.n_hexes(), mesh.groups.volume("region=0").unwrap().hexes.len()), (27, 27));
+    assert_eq!((mesh.mesh.n_elements(), mesh.groups.volume("region=0").unwrap().elements.len()), (27, 27));
     let refused = plicad(&["solve", file, "--out", "no/such/folder/out.vtu"]);
     assert!(String::from_utf8_lossy(&refused.stderr).contains("there is no folder no/such/folder"));
 }

@@ -3,6 +3,7 @@
 mod arc;
 mod checked;
 mod extrapolation;
+mod fibres;
 mod follow;
 mod held;
 mod load;

@@ -80,9 +80,13 @@ fn material(m: &Material) -> Value {
 
 fn accurate_material(m: &plica_accurate::Material) -> Value {
     let model = match m.model {
-        plica_accurate::MaterialModel::Linear => "linear",
-        plica_accurate::MaterialModel::CompressibleNeoHookean => "compressible_neo_hookean",
-        plica_accurate::MaterialModel::StableNeoHookean => "stable_neo_hookean",
+        plica_accurate::MaterialModel::Linear => json!("linear"),
+        plica_accurate::MaterialModel::CompressibleNeoHookean => json!("compressible_neo_hookean"),
+        plica_accurate::MaterialModel::StableNeoHookean => json!("stable_neo_hookean"),
+        plica_accurate::MaterialModel::Exponential { exponent } => json!({ "exponential": exponent }),
+        plica_accurate::MaterialModel::FibreReinforced(fibres) => {
+            json!({ "fibre_reinforced": [fibres.young_modulus_pa, fibres.direction.x, fibres.direction.y, fibres.direction.z] })
+        }
     };
     json!([model, m.young_modulus_pa, m.poisson_ratio])
 }

@@ -29,8 +29,8 @@ fn solve_with(name: &str, changes: &[(&str, &str)], adjust: impl Fn(SolveOptions
     let begin = std::time::Instant::now();
     let solution = follow(&problem, &adjust(case.solve()), &mut |_| ControlFlow::Continue(())).unwrap();
     println!(
-        "{name}: {} hexahedra, {} load steps ({} failed), {} Newton steps, {:.2} s",
-        problem.mesh().n_hexes(),
+        "{name}: {} elements, {} load steps ({} failed), {} Newton steps, {:.2} s",
+        problem.mesh().n_elements(),
         solution.steps.len(),
         solution.n_failed,
         solution.iterations(),

@@ -1,7 +1,7 @@
 //! Forces per volume, such as weight.
 
 use nalgebra::Vector3;
-use plica_geometry::{HexIdx, HexMesh, NodeIdx, isoparametric};
+use plica_geometry::{ElementIdx, HexIdx, HexMesh, NodeIdx, TetMesh, VolumeMesh, isoparametric, tetrahedron};
 
 use super::NodalForces;
 use crate::solid::GAUSS_POINTS;
@@ -21,6 +21,38 @@ pub fn body_forces(mesh: &HexMesh, hexes: impl IntoIterator<Item = (HexIdx, Vect
             }
         }
     }
+    nodal(forces)
+}
+
+/// The same on elements of any kind; on tetrahedra by 4 Gauss points.
+///
+/// # Panics
+/// If an element is not of the mesh.
+pub fn volume_forces(mesh: &VolumeMesh, elements: impl IntoIterator<Item = (ElementIdx, Vector3<f64>)>) -> NodalForces {
+    match mesh {
+        VolumeMesh::Hexahedra(mesh) => {
+            body_forces(mesh, elements.into_iter().map(|(element, force)| (HexIdx(element.0), force)))
+        }
+        VolumeMesh::Tetrahedra(mesh) => on_tetrahedra(mesh, elements),
+    }
+}
+
+fn on_tetrahedra(mesh: &TetMesh, tets: impl IntoIterator<Item = (ElementIdx, Vector3<f64>)>) -> NodalForces {
+    let mut forces = vec![Vector3::zeros(); mesh.n_nodes()];
+    for (tet, per_volume) in tets {
+        let (nodes, positions) = (mesh.nodes_of(tet), mesh.positions_of(tet));
+        for xi in tetrahedron::QUADRATURE {
+            let volume = tetrahedron::jacobian(&positions, xi).determinant() / 24.0;
+            for (node, share) in nodes.iter().zip(tetrahedron::shapes(nodes.len(), xi)) {
+                forces[node.index()] += per_volume * (share * volume);
+            }
+        }
+    }
+    nodal(forces)
+}
+
+/// The forces that are not 0.
+fn nodal(forces: Vec<Vector3<f64>>) -> NodalForces {
     let loaded = forces.into_iter().enumerate().filter(|(_, force)| *force != Vector3::zeros());
     NodalForces::new(loaded.map(|(node, force)| (NodeIdx::from_index(node), force)).collect())
 }

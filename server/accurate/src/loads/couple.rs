@@ -1,9 +1,9 @@
 //! A moment on faces.
 
-use nalgebra::{Matrix3, Vector3};
-use plica_geometry::{HexMesh, NodeIdx};
+use nalgebra::{Matrix3, Point3, Vector3};
+use plica_geometry::{Face, HexMesh, NodeIdx};
 
-use super::quad::{QUAD_GAUSS_POINTS, corners, normal};
+use super::face::{gauss_points, normal, positions};
 use crate::energy::{Energy, Projection};
 use crate::hessian::Hessian;
 
@@ -28,13 +28,22 @@ impl Couple {
     /// # Panics
     /// If a quad names a node that the mesh does not have.
     pub fn new(mesh: &HexMesh, quads: &[[NodeIdx; 4]], moment_nm: Vector3<f64>) -> Self {
-        let rest: Vec<_> = mesh.nodes().iter().map(|x| x.coords).collect();
+        let faces: Vec<Face> = quads.iter().copied().map(Face::from).collect();
+        Self::on_faces(mesh.nodes(), &faces, moment_nm)
+    }
+
+    /// The same on faces of any elements; `nodes` \[m\] are those of the mesh at rest.
+    ///
+    /// # Panics
+    /// If a face names a node that there is not.
+    pub fn on_faces(nodes: &[Point3<f64>], faces: &[Face], moment_nm: Vector3<f64>) -> Self {
+        let rest: Vec<_> = nodes.iter().map(|x| x.coords).collect();
         let mut areas = vec![0.0; rest.len()];
-        for quad in quads {
-            let corners = corners(&rest, quad);
-            for point in &QUAD_GAUSS_POINTS {
-                let area = normal(&corners, point).norm();
-                quad.iter().zip(point.shape).for_each(|(node, share)| areas[node.index()] += area * share);
+        for face in faces {
+            let at = positions(&rest, face);
+            for point in gauss_points(face) {
+                let area = normal(&at, face.nodes().len(), point).norm();
+                face.nodes().iter().zip(point.shape).for_each(|(node, share)| areas[node.index()] += area * share);
             }
         }
         let total: f64 = areas.iter().sum();

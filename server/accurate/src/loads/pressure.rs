@@ -1,9 +1,9 @@
 //! Pressure that follows the surface.
 
 use nalgebra::{Matrix3, Vector3};
-use plica_geometry::NodeIdx;
+use plica_geometry::{Face, NodeIdx};
 
-use super::quad::{QUAD_GAUSS_POINTS, corners, normal, tangents};
+use super::face::{FacePositions, MAX_FACE_NODES, gauss_points, normal, positions, tangents};
 use crate::energy::{Energy, Projection};
 use crate::hessian::Hessian;
 
@@ -13,18 +13,18 @@ use crate::hessian::Hessian;
 /// is the exact Hessian; it is indefinite, and a projected Hessian leaves it out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pressure {
-    quads: Vec<[NodeIdx; 4]>,
+    faces: Vec<Face>,
     pressure_pa: f64,
 }
 
 /// `d gradient_a / dx_b` of a face.
-type Derivative = [[Matrix3<f64>; 4]; 4];
+type Derivative = [[Matrix3<f64>; MAX_FACE_NODES]; MAX_FACE_NODES];
 
 impl Pressure {
-    /// `pressure_pa` \[Pa\], positive when it pushes, on outward `quads` (as [`plica_geometry::HexMesh::boundary_quads`] has
-    /// them).
-    pub fn new(quads: Vec<[NodeIdx; 4]>, pressure_pa: f64) -> Self {
-        Self { quads, pressure_pa }
+    /// `pressure_pa` \[Pa\], positive when it pushes, on outward faces (as [`plica_geometry::HexMesh::boundary_quads`] or
+    /// [`plica_geometry::VolumeMesh::boundary_faces`] has them).
+    pub fn new(faces: Vec<impl Into<Face>>, pressure_pa: f64) -> Self {
+        Self { faces: faces.into_iter().map(Into::into).collect(), pressure_pa }
     }
 
     /// The same faces under another pressure \[Pa\].
@@ -33,14 +33,15 @@ impl Pressure {
     }
 
     /// `p int N_a (N_b,eta [s x .] - N_b,xi [t x .])`, with the tangents `s = dx/dxi`, `t = dx/deta`.
-    fn derivative(&self, corners: &[Vector3<f64>; 4]) -> Derivative {
-        let mut blocks = [[Matrix3::zeros(); 4]; 4];
-        for point in &QUAD_GAUSS_POINTS {
-            let [s, t] = tangents(corners, point);
-            for a in 0..4 {
-                for b in 0..4 {
+    fn derivative(&self, face: &Face, at: &FacePositions) -> Derivative {
+        let mut blocks = [[Matrix3::zeros(); MAX_FACE_NODES]; MAX_FACE_NODES];
+        let n_nodes = face.nodes().len();
+        for point in gauss_points(face) {
+            let [s, t] = tangents(at, n_nodes, point);
+            for a in 0..n_nodes {
+                for b in 0..n_nodes {
                     let turn = s * point.by_eta[b] - t * point.by_xi[b];
-                    blocks[a][b] += turn.cross_matrix() * (self.pressure_pa * point.shape[a]);
+                    blocks[a][b] += turn.cross_matrix() * (self.pressure_pa * point.shape[a] * point.weight);
                 }
             }
         }
@@ -50,7 +51,7 @@ impl Pressure {
 
 impl Energy for Pressure {
     fn visit_stencils(&self, visit: &mut dyn FnMut(&[NodeIdx])) {
-        self.quads.iter().for_each(|quad| visit(quad));
+        self.faces.iter().for_each(|face| visit(face.nodes()));
     }
 
     fn value(&self, _x: &[Vector3<f64>]) -> f64 {
@@ -58,11 +59,11 @@ impl Energy for Pressure {
     }
 
     fn add_gradient(&self, x: &[Vector3<f64>], gradient: &mut [Vector3<f64>]) {
-        for quad in &self.quads {
-            let corners = corners(x, quad);
-            for point in &QUAD_GAUSS_POINTS {
-                let force = normal(&corners, point) * self.pressure_pa;
-                quad.iter().zip(point.shape).for_each(|(node, n)| gradient[node.index()] += force * n);
+        for face in &self.faces {
+            let (at, nodes) = (positions(x, face), face.nodes());
+            for point in gauss_points(face) {
+                let force = normal(&at, nodes.len(), point) * self.pressure_pa;
+                nodes.iter().zip(point.shape).for_each(|(node, n)| gradient[node.index()] += force * n);
             }
         }
     }
@@ -71,9 +72,9 @@ impl Energy for Pressure {
         if projection == Projection::PositiveSemidefinite {
             return;
         }
-        for quad in &self.quads {
-            let d = self.derivative(&corners(x, quad));
-            hessian.add_stencil(quad, |a, b| (d[a][b] + d[b][a].transpose()) * 0.5);
+        for face in &self.faces {
+            let d = self.derivative(face, &positions(x, face));
+            hessian.add_stencil(face.nodes(), |a, b| (d[a][b] + d[b][a].transpose()) * 0.5);
         }
     }
 
@@ -88,15 +89,15 @@ impl Energy for Pressure {
         projection: Projection,
         product: &mut [Vector3<f64>],
     ) {
-        for quad in &self.quads {
-            let d = self.derivative(&corners(x, quad));
-            for a in 0..4 {
-                for b in 0..4 {
+        for face in &self.faces {
+            let (d, nodes) = (self.derivative(face, &positions(x, face)), face.nodes());
+            for a in 0..nodes.len() {
+                for b in 0..nodes.len() {
                     let remainder = match projection {
                         Projection::Exact => (d[a][b] - d[b][a].transpose()) * 0.5,
                         Projection::PositiveSemidefinite => d[a][b],
                     };
-                    product[quad[a].index()] += remainder * v[quad[b].index()];
+                    product[nodes[a].index()] += remainder * v[nodes[b].index()];
                 }
             }
         }

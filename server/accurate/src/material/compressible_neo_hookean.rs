@@ -12,5 +12,12 @@ pub(super) fn value(mu: f64, deformation: &Deformation) -> f64 {
 /// `psi_I = mu/2`, `psi_J = -mu/J`, `psi_JJ = mu/J^2`, `2 psi_I + psi_J = mu j/J`.
 pub(super) fn slopes(mu: f64, deformation: &Deformation) -> Slopes {
     let j = deformation.jacobian();
-    Slopes { by_i: 0.5 * mu, by_j: -mu / j, balance: mu * deformation.j / j, by_ii: 0.0, by_jj: mu / (j * j) }
+    Slopes {
+        by_i: 0.5 * mu,
+        by_j: -mu / j,
+        balance: mu * deformation.j / j,
+        by_ii: 0.0,
+        by_ij: 0.0,
+        by_jj: mu / (j * j),
+    }
 }

@@ -5,6 +5,16 @@ use nalgebra::{Matrix3, Vector3};
 /// Eigenvalues above minus this share of `2 psi_I` count as 0: at rest three of them are.
 const ROUNDING: f64 = 1e-13;
 
+/// Factors of a tangent `identity 1 + along_f F (x) F + along_both (F (x) C + C (x) F) + along_cofactor C (x) C + curvature d^2 J`.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Factors {
+    pub(super) identity: f64,
+    pub(super) along_f: f64,
+    pub(super) along_both: f64,
+    pub(super) along_cofactor: f64,
+    pub(super) curvature: f64,
+}
+
 /// Eigenpairs of a tangent with a negative eigenvalue: at most three of the stretches, three flips and three twists.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct NegativeModes {
@@ -13,14 +23,15 @@ pub(super) struct NegativeModes {
 }
 
 impl NegativeModes {
-    /// Of `H = identity 1 + along_f F (x) F + along_cofactor C (x) C + curvature d^2 J` \[SGK19\]. With
+    /// Of a tangent with the given [`Factors`] \[SGK19\]. With
     /// `F = U diag(s) V^T`, `U` and `V` rotations:
     ///
     /// * flips `U (e_i e_j^T + e_j e_i^T) V^T / sqrt 2` and twists `U (e_i e_j^T - e_j e_i^T) V^T / sqrt 2` have eigenvalues
     ///   `identity -+ curvature s_k`, `k` being the third axis;
-    /// * stretches `U diag(y) V^T` have those of `A = identity I + along_f s s^T + along_cofactor c c^T + curvature S`,
-    ///   `c_k = s_i s_j`, `S_ij = s_k`.
-    pub(super) fn new(f: &Matrix3<f64>, [identity, along_f, along_cofactor, curvature]: [f64; 4]) -> Self {
+    /// * stretches `U diag(y) V^T` have those of `A = identity I + along_f s s^T + along_both (s c^T + c s^T) + along_cofactor c
+    ///   c^T + curvature S`, `c_k = s_i s_j`, `S_ij = s_k`.
+    pub(super) fn new(f: &Matrix3<f64>, factors: &Factors) -> Self {
+        let Factors { identity, along_f, along_both, along_cofactor, curvature } = *factors;
         let mut found = Self::default();
         let (u, s, v) = singular_values(f);
         for k in 0..3 {
@@ -34,10 +45,13 @@ impl NegativeModes {
         }
         let c = Vector3::new(s.y * s.z, s.z * s.x, s.x * s.y);
         let third = Matrix3::new(0.0, s.z, s.y, s.z, 0.0, s.x, s.y, s.x, 0.0);
-        let stretch = Matrix3::from_diagonal_element(identity)
+        let mut stretch = Matrix3::from_diagonal_element(identity)
             + s * s.transpose() * along_f
             + c * c.transpose() * along_cofactor
             + third * curvature;
+        if along_both != 0.0 {
+            stretch += (s * c.transpose() + c * s.transpose()) * along_both;
+        }
         let eigen = stretch.symmetric_eigen();
         for (value, y) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
             found.add(identity, *value, || u * Matrix3::from_diagonal(&y.into_owned()) * v.transpose());

@@ -25,6 +25,7 @@ pub(super) fn slopes(mu: f64, deformation: &Deformation) -> Slopes {
         by_j: mu * (5.0 / 6.0 * j - 1.0),
         balance: mu * (i / (3.0 * s) + 5.0 / 6.0 * j),
         by_ii: 2.0 / 3.0 * mu / (s * s),
+        by_ij: 0.0,
         by_jj: 5.0 / 6.0 * mu,
     }
 }

@@ -1,4 +1,5 @@
 //! Volumetric part of a material as a function of the dilatation `j`: `tr(F) - 3` of the linear one, `J - 1` of the others.
+//! The exponential and the fibre-reinforced material have that of the compressible Neo-Hookean one.
 
 use super::MaterialModel;
 use super::deformation::log_remainder;
@@ -28,7 +29,7 @@ impl Volumetric {
 
 /// `lambda/2 j^2`, or `lambda/4 (J^2 - 1 - 2 ln J) = lambda/4 (j^2 + 2 (j - ln(1 + j)))`, infinite for `J <= 0`.
 pub(super) fn value(model: MaterialModel, lambda: f64, j: f64) -> f64 {
-    if model != MaterialModel::CompressibleNeoHookean {
+    if matches!(model, MaterialModel::Linear | MaterialModel::StableNeoHookean) {
         return 0.5 * lambda * j * j;
     }
     let remainder = log_remainder(j);
@@ -38,7 +39,7 @@ pub(super) fn value(model: MaterialModel, lambda: f64, j: f64) -> f64 {
 /// `lambda j` and `lambda`, or `lambda/2 (J - 1/J) = lambda/2 j (2 + j)/J` and `lambda/2 (1 + 1/J^2)`.
 pub(super) fn derivatives(model: MaterialModel, lambda: f64, j: f64) -> Volumetric {
     let may_clamp = model != MaterialModel::Linear;
-    if model != MaterialModel::CompressibleNeoHookean {
+    if matches!(model, MaterialModel::Linear | MaterialModel::StableNeoHookean) {
         return Volumetric { slope: lambda * j, curvature: lambda, may_clamp };
     }
     let jacobian = 1.0 + j;

@@ -1,4 +1,4 @@
-//! One hexahedron: 2 x 2 x 2 Gauss points and a mean dilatation.
+//! One element: Gauss points and a mean dilatation.
 
 use nalgebra::{Matrix3, Vector3};
 use plica_geometry::{HexIdx, HexMesh, NodeIdx, isoparametric};
@@ -7,41 +7,96 @@ use super::GAUSS_POINTS;
 use crate::energy::Projection;
 use crate::material::{Deformation, Law, MaterialModel, Tangent};
 
-/// Gradients `dN_a/dX` \[1/m\] and weight `det(dX/dxi)` \[m^3\] of a Gauss point.
+/// Gradients `dN_a/dX` \[1/m\] and weight \[m^3\] of a Gauss point.
 #[derive(Debug, Clone)]
-struct GaussPoint {
-    gradients: [Vector3<f64>; 8],
+struct GaussPoint<const N: usize> {
+    gradients: [Vector3<f64>; N],
     weight: f64,
 }
 
+/// Reference element of `N` nodes with `Q` Gauss points.
+#[derive(Debug)]
+pub(super) struct Reference<const N: usize, const Q: usize> {
+    /// Reference coordinates of the Gauss points.
+    pub(super) points: [[f64; 3]; Q],
+    /// Weight of each.
+    pub(super) weight: f64,
+    /// `N_a`.
+    pub(super) shapes: fn([f64; 3]) -> [f64; N],
+    /// `dN_a/dxi`.
+    pub(super) shape_gradients: fn([f64; 3]) -> [[f64; 3]; N],
+    /// Reference coordinates of the centre.
+    pub(super) centre: [f64; 3],
+}
+
+const HEXAHEDRON: Reference<8, 8> = Reference {
+    points: GAUSS_POINTS,
+    weight: 1.0,
+    shapes: isoparametric::shape_functions,
+    shape_gradients: isoparametric::shape_gradients,
+    centre: [0.0; 3],
+};
+
+/// `N` nodes, `Q` Gauss points.
 #[derive(Debug, Clone)]
-pub(super) struct Element {
-    nodes: [NodeIdx; 8],
-    rest: [Vector3<f64>; 8],
-    points: [GaussPoint; 8],
+pub(super) struct Element<const N: usize, const Q: usize> {
+    reference: &'static Reference<N, Q>,
+    nodes: [NodeIdx; N],
+    rest: [Vector3<f64>; N],
+    points: [GaussPoint<N>; Q],
     volume: f64,
     law: Law,
 }
 
 /// An element's deformation at its Gauss points, and its mean dilatation.
-struct State {
-    points: [Deformation; 8],
+struct State<const Q: usize> {
+    points: [Deformation; Q],
     dilatation: f64,
 }
 
-/// Blocks `[a][b]`, `b <= a`, of the symmetric `24 x 24` matrix; those above the diagonal are not set.
-pub(super) type Blocks = [[Matrix3<f64>; 8]; 8];
+/// Blocks `[a][b]`, `b <= a`, of the symmetric `3 N x 3 N` matrix; those above the diagonal are not set.
+pub(super) type Blocks<const N: usize> = [[Matrix3<f64>; N]; N];
 
-impl Element {
-    pub(super) fn new(mesh: &HexMesh, hex: HexIdx, law: Law) -> Self {
+impl Element<8, 8> {
+    /// A hexahedron.
+    pub(super) fn hexahedron(mesh: &HexMesh, hex: HexIdx, law: Law) -> Self {
         let rest = mesh.corner_positions(hex).map(|corner| corner.coords);
-        let points = GAUSS_POINTS.map(|xi| gauss_point(&rest, xi));
+        Self::new(&HEXAHEDRON, mesh.hexes()[hex.index()], rest, law)
+    }
+}
+
+impl<const N: usize, const Q: usize> Element<N, Q> {
+    pub(super) fn new(
+        reference: &'static Reference<N, Q>,
+        nodes: [NodeIdx; N],
+        rest: [Vector3<f64>; N],
+        law: Law,
+    ) -> Self {
+        let points = reference.points.map(|xi| reference.gauss_point(&rest, xi));
         let volume = points.iter().map(|q| q.weight).sum();
-        Self { nodes: mesh.hexes()[hex.index()], rest, points, volume, law }
+        Self { reference, nodes, rest, points, volume, law }
     }
 
-    pub(super) fn nodes(&self) -> &[NodeIdx; 8] {
+    pub(super) fn nodes(&self) -> &[NodeIdx; N] {
         &self.nodes
+    }
+
+    pub(super) fn law(&self) -> &Law {
+        &self.law
+    }
+
+    pub(super) fn reference(&self) -> &Reference<N, Q> {
+        self.reference
+    }
+
+    /// `dX/dxi` \[m\] at the centre.
+    pub(super) fn jacobian_at_centre(&self) -> Matrix3<f64> {
+        jacobian(&self.rest, &(self.reference.shape_gradients)(self.reference.centre))
+    }
+
+    /// Position at rest \[m\] of reference coordinates.
+    pub(super) fn rest_at(&self, xi: [f64; 3]) -> Vector3<f64> {
+        self.rest.iter().zip((self.reference.shapes)(xi)).map(|(x, n)| x * n).sum()
     }
 
     pub(super) fn value(&self, x: &[Vector3<f64>]) -> f64 {
@@ -51,10 +106,10 @@ impl Element {
     }
 
     /// `dW/dx_a = sum_q w_q (dpsi/dF + U' C) dN_a/dX`, with `C = dJ/dF`.
-    pub(super) fn gradient(&self, x: &[Vector3<f64>]) -> [Vector3<f64>; 8] {
+    pub(super) fn gradient(&self, x: &[Vector3<f64>]) -> [Vector3<f64>; N] {
         let state = self.state(x);
         let pressure = self.law.volumetric(state.dilatation).slope;
-        let mut forces = [Vector3::zeros(); 8];
+        let mut forces = [Vector3::zeros(); N];
         for (q, d) in self.points.iter().zip(&state.points) {
             let stress = (self.law.local_stress(d) + self.law.dilatation_gradient(d) * pressure) * q.weight;
             forces.iter_mut().zip(&q.gradients).for_each(|(force, g)| *force += stress * g);
@@ -64,11 +119,11 @@ impl Element {
 
     /// `d^2 W/dx_a dx_b = sum_q w_q (d^2 psi/dF^2 + U' d^2 J/dF^2)[dN_a/dX, dN_b/dX] + V U'' c_a c_b^T`,
     /// `c_a = sum_q w_q/V C dN_a/dX`.
-    pub(super) fn hessian(&self, x: &[Vector3<f64>], projection: Projection) -> Blocks {
+    pub(super) fn hessian(&self, x: &[Vector3<f64>], projection: Projection) -> Blocks<N> {
         let state = self.state(x);
         let volumetric = self.law.volumetric(state.dilatation);
-        let mut blocks = [[Matrix3::zeros(); 8]; 8];
-        let mut mean = [Vector3::zeros(); 8];
+        let mut blocks = [[Matrix3::zeros(); N]; N];
+        let mut mean = [Vector3::zeros(); N];
         for (q, d) in self.points.iter().zip(&state.points) {
             let tangent = Tangent::new(&self.law, d, volumetric.slope, projection);
             tangent.add_blocks(&q.gradients, q.weight, &mut blocks);
@@ -76,7 +131,7 @@ impl Element {
             mean.iter_mut().zip(&q.gradients).for_each(|(mean, g)| *mean += c * g);
         }
         let curvature = volumetric.curvature(projection) / self.volume;
-        for a in 0..8 {
+        for a in 0..N {
             for b in 0..=a {
                 blocks[a][b] += mean[a] * (mean[b] * curvature).transpose();
             }
@@ -93,7 +148,7 @@ impl Element {
     }
 
     pub(super) fn deformation_at(&self, x: &[Vector3<f64>], xi: [f64; 3]) -> Deformation {
-        deformation(&self.displacements(x), &gauss_point(&self.rest, xi).gradients)
+        deformation(&self.displacements(x), &self.reference.gauss_point(&self.rest, xi).gradients)
     }
 
     pub(super) fn cauchy_stress(&self, x: &[Vector3<f64>], xi: [f64; 3]) -> Matrix3<f64> {
@@ -105,26 +160,34 @@ impl Element {
         local + Matrix3::from_diagonal_element(pressure)
     }
 
-    fn state(&self, x: &[Vector3<f64>]) -> State {
+    fn state(&self, x: &[Vector3<f64>]) -> State<Q> {
         let u = self.displacements(x);
-        let points: [Deformation; 8] = std::array::from_fn(|q| deformation(&u, &self.points[q].gradients));
+        let points: [Deformation; Q] = std::array::from_fn(|q| deformation(&u, &self.points[q].gradients));
         let sum: f64 = points.iter().zip(&self.points).map(|(d, q)| q.weight * self.law.dilatation(d)).sum();
         State { points, dilatation: sum / self.volume }
     }
 
-    fn displacements(&self, x: &[Vector3<f64>]) -> [Vector3<f64>; 8] {
+    fn displacements(&self, x: &[Vector3<f64>]) -> [Vector3<f64>; N] {
         std::array::from_fn(|a| x[self.nodes[a].index()] - self.rest[a])
     }
 }
 
-/// `G = sum_a u_a (dN_a/dX)^T`.
-fn deformation(u: &[Vector3<f64>; 8], gradients: &[Vector3<f64>; 8]) -> Deformation {
-    Deformation::new(u.iter().zip(gradients).fold(Matrix3::zeros(), |sum, (u, g)| sum + u * g.transpose()))
+impl<const N: usize, const Q: usize> Reference<N, Q> {
+    fn gauss_point(&self, rest: &[Vector3<f64>; N], xi: [f64; 3]) -> GaussPoint<N> {
+        let by_xi = (self.shape_gradients)(xi);
+        let jacobian = jacobian(rest, &by_xi);
+        let inverse = jacobian.try_inverse().unwrap_or_else(Matrix3::zeros);
+        let gradients = by_xi.map(|g| inverse.tr_mul(&Vector3::from(g)));
+        GaussPoint { gradients, weight: jacobian.determinant() * self.weight }
+    }
 }
 
-fn gauss_point(rest: &[Vector3<f64>; 8], xi: [f64; 3]) -> GaussPoint {
-    let jacobian = isoparametric::jacobian(&rest.map(Into::into), xi);
-    let inverse = jacobian.try_inverse().unwrap_or_else(Matrix3::zeros);
-    let gradients = isoparametric::shape_gradients(xi).map(|g| inverse.tr_mul(&Vector3::from(g)));
-    GaussPoint { gradients, weight: jacobian.determinant() }
+/// `dX/dxi = sum_a X_a (dN_a/dxi)^T`.
+fn jacobian<const N: usize>(rest: &[Vector3<f64>; N], by_xi: &[[f64; 3]; N]) -> Matrix3<f64> {
+    rest.iter().zip(by_xi).fold(Matrix3::zeros(), |sum, (x, g)| sum + x * Vector3::from(*g).transpose())
+}
+
+/// `G = sum_a u_a (dN_a/dX)^T`.
+fn deformation<const N: usize>(u: &[Vector3<f64>; N], gradients: &[Vector3<f64>; N]) -> Deformation {
+    Deformation::new(u.iter().zip(gradients).fold(Matrix3::zeros(), |sum, (u, g)| sum + u * g.transpose()))
 }

@@ -5,17 +5,29 @@
 pub mod derivatives;
 pub mod manufactured;
 pub mod random;
+pub mod tets;
 
 use std::ops::ControlFlow;
 
 use nalgebra::{Matrix3, Point3, Vector3};
-use plica_accurate::{Constraints, Energy, Info, Material, MaterialModel, Params, SolveError, Solver};
+use plica_accurate::{Constraints, Energy, Fibres, Info, Material, MaterialModel, Params, SolveError, Solver};
 use plica_geometry::HexMesh;
 use plica_geometry::shapes::block;
 use random::Random;
 
-pub const MODELS: [MaterialModel; 3] =
-    [MaterialModel::Linear, MaterialModel::CompressibleNeoHookean, MaterialModel::StableNeoHookean];
+pub const EXPONENTIAL: MaterialModel = MaterialModel::Exponential { exponent: 2.0 };
+/// Fibres five times as stiff as 3e4 Pa, at a slant.
+pub const FIBRE_REINFORCED: MaterialModel =
+    MaterialModel::FibreReinforced(Fibres { young_modulus_pa: 1.5e5, direction: Vector3::new(1.0, 2.0, -1.0) });
+pub const ISOTROPIC: [MaterialModel; 4] =
+    [MaterialModel::Linear, MaterialModel::CompressibleNeoHookean, MaterialModel::StableNeoHookean, EXPONENTIAL];
+pub const MODELS: [MaterialModel; 5] = [
+    MaterialModel::Linear,
+    MaterialModel::CompressibleNeoHookean,
+    MaterialModel::StableNeoHookean,
+    EXPONENTIAL,
+    FIBRE_REINFORCED,
+];
 
 pub fn material(model: MaterialModel, young_modulus_pa: f64, poisson_ratio: f64) -> Material {
     Material { model, young_modulus_pa, poisson_ratio }

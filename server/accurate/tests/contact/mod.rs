@@ -2,6 +2,8 @@
 #![allow(dead_code, unreachable_pub, reason = "every test file uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
+pub mod quarter;
+
 use std::ops::ControlFlow;
 
 use nalgebra::{Isometry3, Point3, Vector3};

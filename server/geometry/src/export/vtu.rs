@@ -1,4 +1,4 @@
-//! VTK unstructured grid (XML) of a hexahedral mesh with fields at its nodes and in its cells: ParaView opens it.
+//! VTK unstructured grid (XML) of a mesh with fields at its nodes and in its cells: ParaView opens it.
 
 use std::path::Path;
 
@@ -10,8 +10,9 @@ use vtkio::{IOBuffer, Vtk};
 
 use super::{ExportError, write_file};
 use crate::hex_mesh::HexMesh;
+use crate::volume_mesh::{ElementKind, VolumeMesh};
 
-/// A named field with one value per node or per hexahedron.
+/// A named field with one value per node or per element.
 #[derive(Clone, Copy, Debug)]
 pub enum Field<'a> {
     /// Numbers `[n]`.
@@ -64,12 +65,46 @@ pub fn write_vtu(
     point_fields: &[Field<'_>],
     cell_fields: &[Field<'_>],
 ) -> Result<(), ExportError> {
-    check_lengths(point_fields, mesh.n_nodes(), "nodes")?;
-    check_lengths(cell_fields, mesh.n_hexes(), "hexahedra")?;
+    write(path, &Grid { points: mesh.nodes(), cells: cells(mesh), of: "hexahedra" }, point_fields, cell_fields)
+}
+
+/// As [`write_vtu`], of any elements.
+///
+/// # Errors
+/// As [`write_vtu`].
+pub fn write_volume_vtu(
+    path: &Path,
+    mesh: &VolumeMesh,
+    point_fields: &[Field<'_>],
+    cell_fields: &[Field<'_>],
+) -> Result<(), ExportError> {
+    let cells = match mesh {
+        VolumeMesh::Hexahedra(mesh) => cells(mesh),
+        VolumeMesh::Tetrahedra(_) => tet_cells(mesh),
+    };
+    write(path, &Grid { points: mesh.nodes(), cells, of: mesh.kind().plural() }, point_fields, cell_fields)
+}
+
+/// Points and cells of a file.
+struct Grid<'a> {
+    points: &'a [Point3<f64>],
+    cells: Cells,
+    /// Name of the cells.
+    of: &'static str,
+}
+
+fn write(
+    path: &Path,
+    grid: &Grid<'_>,
+    point_fields: &[Field<'_>],
+    cell_fields: &[Field<'_>],
+) -> Result<(), ExportError> {
+    check_lengths(point_fields, grid.points.len(), "nodes")?;
+    check_lengths(cell_fields, grid.cells.types.len(), grid.of)?;
     let attributes = |fields: &[Field<'_>]| fields.iter().map(|field| field.to_attribute()).collect();
     let piece = UnstructuredGridPiece {
-        points: flat_points(mesh.nodes()),
-        cells: cells(mesh),
+        points: flat_points(grid.points),
+        cells: grid.cells.clone(),
         data: Attributes { point: attributes(point_fields), cell: attributes(cell_fields) },
     };
     let vtk = Vtk {
@@ -115,4 +150,15 @@ fn cells(mesh: &HexMesh) -> Cells {
         cell_verts: VertexNumbers::XML { connectivity, offsets },
         types: vec![CellType::Hexahedron; mesh.n_hexes()],
     }
+}
+
+fn tet_cells(mesh: &VolumeMesh) -> Cells {
+    let connectivity: Vec<u64> =
+        mesh.elements().flat_map(|tet| mesh.nodes_of(tet).iter().map(|node| u64::from(node.0))).collect();
+    let (n_nodes, cell_type) = match mesh.kind() {
+        ElementKind::QuadraticTetrahedron => (10, CellType::QuadraticTetra),
+        _ => (4, CellType::Tetra),
+    };
+    let offsets = (1..=mesh.n_elements() as u64).map(|n| n_nodes * n).collect();
+    Cells { cell_verts: VertexNumbers::XML { connectivity, offsets }, types: vec![cell_type; mesh.n_elements()] }
 }

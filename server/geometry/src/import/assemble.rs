@@ -6,10 +6,13 @@ use nalgebra::Point3;
 
 use super::error::{DAMAGED, Fault, Place, fault};
 use super::groups::{Group, Groups};
-use super::named_mesh::NamedMesh;
+use super::named_mesh::{CellVectors, NamedMesh};
+use crate::face::FaceCorners;
 use crate::hex_mesh::{HexMesh, MeshError};
-use crate::index::{HexIdx, NodeIdx};
+use crate::index::{ElementIdx, NodeIdx};
 use crate::isoparametric;
+use crate::tet_mesh::{TetMesh, TetMeshError, Tets};
+use crate::volume_mesh::VolumeMesh;
 
 /// Content of a mesh file, independent of its format.
 #[derive(Debug, Default)]
@@ -23,113 +26,194 @@ pub(super) struct Content {
     pub(super) point_labels: Vec<(String, Vec<usize>)>,
     /// Where the points of each piece of the file begin; empty for a file of one piece.
     pub(super) pieces: Vec<usize>,
+    /// Arrays of one vector per cell.
+    pub(super) cell_vectors: Vec<CellVectors>,
 }
 
-/// A cell by its corners, which index `points`.
+/// Most nodes of a cell.
+pub(super) const MAX_NODES: usize = 10;
+
+/// A cell by its nodes, which index `points`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cell {
     pub(super) shape: Shape,
-    pub(super) corners: [u32; 8],
+    pub(super) nodes: [u32; MAX_NODES],
     /// Name in the file.
     pub(super) number: u64,
 }
 
-/// Supported shapes. Second-order cells of less than three dimensions are read by their corners.
+/// Supported shapes. Of second-order cells of less than three dimensions those are read with the nodes on their edges that are
+/// faces and edges of tetrahedra, the others by their corners.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shape {
     Point,
     Line,
+    CurvedLine,
     Triangle,
+    CurvedTriangle,
     Quad,
     Hexahedron,
+    Tetrahedron,
+    QuadraticTetrahedron,
 }
 
 impl Shape {
-    pub(super) fn n_corners(self) -> usize {
+    pub(super) fn n_nodes(self) -> usize {
         match self {
             Self::Point => 1,
             Self::Line => 2,
-            Self::Triangle => 3,
-            Self::Quad => 4,
+            Self::CurvedLine | Self::Triangle => 3,
+            Self::Quad | Self::Tetrahedron => 4,
+            Self::CurvedTriangle => 6,
             Self::Hexahedron => 8,
+            Self::QuadraticTetrahedron => 10,
         }
+    }
+
+    /// Corners of a face; `None` of other shapes.
+    fn n_face_corners(self) -> Option<usize> {
+        match self {
+            Self::Triangle | Self::CurvedTriangle => Some(3),
+            Self::Quad => Some(4),
+            _ => None,
+        }
+    }
+
+    /// Name of several such volumes.
+    pub(super) fn plural(self) -> &'static str {
+        match self {
+            Self::Tetrahedron => "4-node tetrahedra",
+            Self::QuadraticTetrahedron => "10-node tetrahedra",
+            _ => "hexahedra",
+        }
+    }
+
+    /// Name of one such volume.
+    pub(super) fn singular(self) -> &'static str {
+        if self == Self::Hexahedron { "hexahedron" } else { "tetrahedron" }
     }
 
     pub(super) fn dimension(self) -> u8 {
         match self {
             Self::Point => 0,
-            Self::Line => 1,
-            Self::Triangle | Self::Quad => 2,
-            Self::Hexahedron => 3,
+            Self::Line | Self::CurvedLine => 1,
+            Self::Triangle | Self::CurvedTriangle | Self::Quad => 2,
+            Self::Hexahedron | Self::Tetrahedron | Self::QuadraticTetrahedron => 3,
         }
     }
 }
 
 impl Cell {
-    pub(super) fn corners(&self) -> &[u32] {
-        &self.corners[..self.shape.n_corners()]
+    pub(super) fn nodes(&self) -> &[u32] {
+        &self.nodes[..self.shape.n_nodes()]
     }
 
-    fn sorted_corners(&self) -> [u32; 8] {
-        let mut corners = self.corners;
-        corners[..self.shape.n_corners()].sort_unstable();
-        corners
+    fn is_volume(&self) -> bool {
+        self.shape.dimension() == 3
+    }
+
+    fn sorted_nodes(&self) -> [u32; MAX_NODES] {
+        let mut nodes = self.nodes;
+        nodes[..self.shape.n_nodes()].sort_unstable();
+        nodes
     }
 }
 
 /// Mesh indices of the points and cells of a file.
 struct Places {
     node_of_point: Vec<Option<NodeIdx>>,
-    /// Hexahedra only; a hexahedron given twice (once per physical group in MSH 2.2) is one.
-    hex_of_cell: HashMap<usize, HexIdx>,
+    /// Volumes only; a volume given twice (once per physical group in MSH 2.2) is one.
+    element_of_cell: HashMap<usize, ElementIdx>,
 }
 
 impl Content {
     pub(super) fn assemble(self, metres_per_unit: f64) -> Result<NamedMesh, Fault> {
-        let (numbers, places) = self.place()?;
-        let hexes: Vec<_> = numbers.iter().map(|&cell| self.nodes_of(cell, &places)).collect();
+        let shape = self.volume_shape()?;
+        let (numbers, places) = self.place();
         let used = self.points.iter().zip(&places.node_of_point).filter(|(_, node)| node.is_some());
         let nodes = used.map(|(x, _)| x * metres_per_unit).collect();
-        let mesh = HexMesh::new(nodes, hexes).map_err(|error| self.mesh_fault(&error, &numbers))?;
+        let mesh = match shape {
+            Shape::Tetrahedron => self.tets(nodes, &numbers, Tets::Linear(self.elements(&numbers, &places)))?.into(),
+            Shape::QuadraticTetrahedron => {
+                self.tets(nodes, &numbers, Tets::Quadratic(self.elements(&numbers, &places)))?.into()
+            }
+            _ => {
+                let hexes = self.elements(&numbers, &places);
+                VolumeMesh::from(HexMesh::new(nodes, hexes).map_err(|error| self.mesh_fault(&error, &numbers))?)
+            }
+        };
         let groups = self.groups(&places);
-        Ok(NamedMesh { mesh, groups, remarks: Vec::new() })
+        let of_elements = |vectors: &CellVectors| CellVectors {
+            name: vectors.name.clone(),
+            values: numbers.iter().map(|&cell| vectors.values.get(cell).copied().unwrap_or_default()).collect(),
+        };
+        let vectors = self.cell_vectors.iter().map(of_elements).collect();
+        Ok(NamedMesh { mesh, groups, remarks: Vec::new(), vectors })
     }
 
-    /// Hexahedra of the mesh, and mesh indices of all points and cells.
-    fn place(&self) -> Result<(Vec<usize>, Places), Fault> {
+    /// The one shape of all volumes. Beside each other, faces of different shapes would not match.
+    fn volume_shape(&self) -> Result<Shape, Fault> {
+        let mut volumes = self.cells.iter().filter(|cell| cell.is_volume());
+        let Some(first) = volumes.next() else { return self.no_volume() };
+        if let Some(other) = volumes.find(|cell| cell.shape != first.shape) {
+            let n = |shape: Shape| self.cells.iter().filter(|cell| cell.shape == shape).count();
+            let [one, two] = [first.shape, other.shape].map(|shape| format!("{} {}", n(shape), shape.plural()));
+            let advice = "mesh the whole body with one of 8-node hexahedra, 4-node and 10-node tetrahedra: without the others \
+                          the body would have holes";
+            let place = Place::Field(format!("cell {}", other.number), None);
+            return fault(place, format!("holds {two} beside {one}; one kind is read"), advice);
+        }
+        Ok(first.shape)
+    }
+
+    /// Volumes of the mesh, and mesh indices of all points and cells.
+    fn place(&self) -> (Vec<usize>, Places) {
         let mut seen = HashMap::new();
-        let mut hex_of_cell = HashMap::new();
+        let mut element_of_cell = HashMap::new();
         let mut numbers = Vec::new();
         let mut is_used = vec![false; self.points.len()];
-        for (i, cell) in self.cells.iter().enumerate().filter(|(_, cell)| cell.shape == Shape::Hexahedron) {
-            let hex = *seen.entry(cell.sorted_corners()).or_insert_with(|| {
+        for (i, cell) in self.cells.iter().enumerate().filter(|(_, cell)| cell.is_volume()) {
+            let element = *seen.entry(cell.sorted_nodes()).or_insert_with(|| {
                 numbers.push(i);
-                HexIdx::from_index(numbers.len() - 1)
+                ElementIdx::from_index(numbers.len() - 1)
             });
-            hex_of_cell.insert(i, hex);
-            cell.corners().iter().for_each(|&point| is_used[point as usize] = true);
-        }
-        if numbers.is_empty() {
-            return self.no_hexahedra();
+            element_of_cell.insert(i, element);
+            cell.nodes().iter().for_each(|&point| is_used[point as usize] = true);
         }
         let mut nodes = (0..).map(NodeIdx);
         let node_of_point = is_used.into_iter().map(|used| if used { nodes.next() } else { None }).collect();
-        Ok((numbers, Places { node_of_point, hex_of_cell }))
+        (numbers, Places { node_of_point, element_of_cell })
     }
 
-    fn no_hexahedra<T>(&self) -> Result<T, Fault> {
+    fn no_volume<T>(&self) -> Result<T, Fault> {
         let n_surface = self.cells.iter().filter(|cell| cell.shape.dimension() == 2).count();
         if n_surface > 0 {
-            let problem = format!("holds {n_surface} triangles or quads and no hexahedra: it is a surface");
-            return fault(Place::File, problem, "fill its inside with 8-node hexahedra");
+            let problem =
+                format!("holds {n_surface} triangles or quads and no hexahedra or tetrahedra: it is a surface");
+            return fault(Place::File, problem, "fill its inside with 8-node hexahedra or 10-node tetrahedra");
         }
-        let problem = format!("holds no hexahedra ({} points, {} cells)", self.points.len(), self.cells.len());
+        let problem =
+            format!("holds no hexahedra or tetrahedra ({} points, {} cells)", self.points.len(), self.cells.len());
         fault(Place::File, problem, "save the volume mesh; in Gmsh: mesh in 3D, and put the volume in a physical group")
     }
 
-    /// Nodes of a hexahedral cell.
-    fn nodes_of(&self, cell: usize, places: &Places) -> [NodeIdx; 8] {
-        self.cells[cell].corners.map(|point| places.node_of_point[point as usize].unwrap_or_default())
+    /// Nodes of volumes of `N` nodes.
+    fn elements<const N: usize>(&self, numbers: &[usize], places: &Places) -> Vec<[NodeIdx; N]> {
+        let node = |point: u32| places.node_of_point[point as usize].unwrap_or_default();
+        numbers.iter().map(|&cell| std::array::from_fn(|k| node(self.cells[cell].nodes[k]))).collect()
+    }
+
+    fn tets(&self, nodes: Vec<Point3<f64>>, numbers: &[usize], tets: Tets) -> Result<TetMesh, Fault> {
+        TetMesh::new(nodes, tets).map_err(|error| match &error {
+            TetMeshError::Inverted { tet, .. } => {
+                let cell = format!("cell {}", self.cells[numbers[tet.index()]].number);
+                let advice = "turn mirrored tetrahedra round; where a curved edge turns one over, refine there or optimise the \
+                              mesh (in Gmsh Mesh.HighOrderOptimize = 2)";
+                Fault::new(Place::Field(cell, None), error.to_string(), advice)
+            }
+            TetMeshError::NonFinite { .. } => Fault::new(Place::File, error.to_string(), DAMAGED),
+            _ => Fault::new(Place::File, error.to_string(), "mend the mesh: every face belongs to one or two tetrahedra"),
+        })
     }
 
     fn mesh_fault(&self, error: &MeshError, numbers: &[usize]) -> Fault {
@@ -154,12 +238,11 @@ impl Content {
     /// Number of hexahedra with an inverted corner.
     fn count_inverted(&self, numbers: &[usize]) -> usize {
         let is_inverted = |&&cell: &&usize| {
-            let corners = self.cells[cell].corners.map(|point| self.points[point as usize]);
+            let corners = std::array::from_fn(|k| self.points[self.cells[cell].nodes[k] as usize]);
             isoparametric::CORNERS.iter().any(|&xi| isoparametric::jacobian(&corners, xi).determinant() <= 0.0)
         };
         numbers.iter().filter(is_inverted).count()
     }
-
     fn groups(&self, places: &Places) -> Groups {
         let cells = self.cell_labels.iter().map(|(name, dimension, cells)| {
             let mut group = Group { name: name.clone(), dimension: *dimension, ..Group::default() };
@@ -175,14 +258,13 @@ impl Content {
     }
 
     fn add(&self, group: &mut Group, cell: usize, places: &Places) {
-        let nodes = self.cells[cell].corners().iter().map(|&point| places.node_of_point[point as usize]);
+        let nodes = self.cells[cell].nodes().iter().map(|&point| places.node_of_point[point as usize]);
         group.nodes.extend(nodes.clone().flatten());
-        group.hexes.extend(places.hex_of_cell.get(&cell));
-        if self.cells[cell].shape == Shape::Quad
-            && let Ok(mut face) = <[NodeIdx; 4]>::try_from(nodes.flatten().collect::<Vec<_>>())
+        group.elements.extend(places.element_of_cell.get(&cell));
+        if let Some(n_corners) = self.cells[cell].shape.n_face_corners()
+            && let Some(corners) = nodes.take(n_corners).collect::<Option<Vec<_>>>()
         {
-            face.sort_unstable();
-            group.faces.push(face);
+            group.faces.push(FaceCorners::new(&corners));
         }
     }
 }
@@ -190,8 +272,8 @@ impl Content {
 fn tidy(mut group: Group) -> Group {
     group.nodes.sort_unstable();
     group.nodes.dedup();
-    group.hexes.sort_unstable();
-    group.hexes.dedup();
+    group.elements.sort_unstable();
+    group.elements.dedup();
     group.faces.sort_unstable();
     group.faces.dedup();
     group

@@ -11,7 +11,7 @@ const REMESH: &str = "mesh the body anew so that neighbouring hexahedra share wh
 
 /// Refuses parts that touch without being joined; where they are meant, or do little harm, they become remarks.
 pub(super) fn joints(named: &mut NamedMesh, options: &ReadOptions) -> Result<(), Fault> {
-    let joints = Joints::find(&named.mesh);
+    let joints = Joints::of_volume(&named.mesh);
     let unit = options.metres_per_unit;
     for (problem, advice) in wrong(&joints, options) {
         if options.merge_tolerance_m != Some(0.0) {

@@ -1,6 +1,7 @@
 //! Named parts of a mesh.
 
-use crate::index::{HexIdx, NodeIdx};
+use crate::face::FaceCorners;
+use crate::index::{ElementIdx, NodeIdx};
 
 /// Name of a part of the mesh in its file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -9,12 +10,12 @@ pub struct Group {
     pub name: String,
     /// 3 for volumes, 2 for surfaces, 1 for curves, 0 for points.
     pub dimension: u8,
-    /// Nodes of its cells that belong to hexahedra, in increasing order.
+    /// Nodes of its cells that belong to elements of the mesh, in increasing order.
     pub nodes: Vec<NodeIdx>,
-    /// Its quads, each with its nodes in increasing order, in increasing order; for surfaces.
-    pub faces: Vec<[NodeIdx; 4]>,
-    /// Its hexahedra in increasing order; for volumes.
-    pub hexes: Vec<HexIdx>,
+    /// Its quads and triangles by their corners, in increasing order; for surfaces.
+    pub faces: Vec<FaceCorners>,
+    /// Its elements in increasing order; for volumes.
+    pub elements: Vec<ElementIdx>,
 }
 
 /// All groups of a file, in file order.
@@ -33,12 +34,12 @@ impl Groups {
         self.groups.iter()
     }
 
-    /// Group of hexahedra with that name.
+    /// Group of volumes with that name.
     pub fn volume(&self, name: &str) -> Option<&Group> {
         self.iter().find(|group| group.name == name && group.dimension == 3)
     }
 
-    /// Group of quads with that name.
+    /// Group of faces with that name.
     pub fn surface(&self, name: &str) -> Option<&Group> {
         self.iter().find(|group| group.name == name && group.dimension == 2)
     }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use nalgebra::Point3;
 
-use super::assemble::{Content, Shape};
+use super::assemble::Content;
 use super::error::{Fault, Place, fault};
 use super::options::ReadOptions;
 
@@ -79,15 +79,16 @@ fn common_points(content: &Content) -> Vec<u32> {
     first
 }
 
-/// Refuses a tolerance that merges corners of one hexahedron.
+/// Refuses a tolerance that merges nodes of one volume.
 fn check_shapes(content: &Content, first: &[u32], options: &ReadOptions, tolerance_m: f64) -> Result<(), Fault> {
-    for cell in content.cells.iter().filter(|cell| cell.shape == Shape::Hexahedron) {
-        for (k, a) in cell.corners.iter().enumerate() {
-            let twin = cell.corners[..k].iter().find(|b| *b != a && first[**b as usize] == first[*a as usize]);
+    for cell in content.cells.iter().filter(|cell| cell.shape.dimension() == 3) {
+        for (k, a) in cell.nodes().iter().enumerate() {
+            let twin = cell.nodes()[..k].iter().find(|b| *b != a && first[**b as usize] == first[*a as usize]);
             if let Some(b) = twin {
                 let apart = (content.points[*a as usize] - content.points[*b as usize]).norm();
                 let problem = format!(
-                    "merge_tolerance_m = {tolerance_m:e} would merge two corners of a hexahedron, which are {:e} m apart",
+                    "merge_tolerance_m = {tolerance_m:e} would merge two nodes of a {}, which are {:e} m apart",
+                    cell.shape.singular(),
                     apart * options.metres_per_unit
                 );
                 let advice = "give a tolerance well below the shortest edge";
@@ -100,8 +101,8 @@ fn check_shapes(content: &Content, first: &[u32], options: &ReadOptions, toleran
 
 fn replace(mut content: Content, first: &[u32]) -> Content {
     for cell in &mut content.cells {
-        let n_corners = cell.shape.n_corners();
-        cell.corners[..n_corners].iter_mut().for_each(|corner| *corner = first[*corner as usize]);
+        let n_nodes = cell.shape.n_nodes();
+        cell.nodes[..n_nodes].iter_mut().for_each(|node| *node = first[*node as usize]);
     }
     let labels = content.point_labels.iter_mut().flat_map(|(_, points)| points);
     labels.for_each(|point| *point = first[*point] as usize);

@@ -9,9 +9,9 @@ use std::collections::HashMap;
 
 use nalgebra::Point3;
 
-use super::assemble::{Cell, Content, Labels, Shape};
+use super::assemble::{Cell, Content, Labels, MAX_NODES, Shape};
 use super::error::{DAMAGED, Fault, Place, fault};
-use elements::{Element, Kind};
+use elements::{Element, Kind, READ};
 use reader::Reader;
 
 /// Content of the file read so far.
@@ -72,6 +72,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Content, Fault> {
         cell_labels: content.labels.into_vec(),
         point_labels: Vec::new(),
         pieces: Vec::new(),
+        cell_vectors: Vec::new(),
     })
 }
 
@@ -131,7 +132,7 @@ impl MshContent {
         Ok(())
     }
 
-    /// Adds an element by its corners, with its physical groups.
+    /// Adds an element by its nodes, with its physical groups.
     fn add_element(
         &mut self,
         reader: &Reader<'_>,
@@ -144,15 +145,15 @@ impl MshContent {
             self.count_unsupported(element);
             return Ok(());
         };
-        let mut corners = [0; 8];
-        for (corner, tag) in corners.iter_mut().zip(&tags[..shape.n_corners()]) {
+        let mut nodes = [0; MAX_NODES];
+        for (k, tag) in tags[..shape.n_nodes()].iter().enumerate() {
             let Some(&point) = self.point_of_tag.get(tag) else {
                 let problem = format!("element {number} names node {tag}, which the file does not give");
                 return fault(reader.place(), problem, DAMAGED);
             };
-            *corner = point;
+            nodes[elements::place(shape, k)] = point;
         }
-        self.cells.push(Cell { shape, corners, number });
+        self.cells.push(Cell { shape, nodes, number });
         self.label_last(shape, groups);
         Ok(())
     }
@@ -174,10 +175,10 @@ impl MshContent {
         }
     }
 
-    /// Refuses volumes other than 8-node hexahedra: leaving them out would make holes.
+    /// Refuses volumes that are not read: leaving them out would make holes.
     fn refuse_unsupported(&self) -> Result<(), Fault> {
         let Some((element, count)) = self.unsupported.first() else { return Ok(()) };
-        let problem = format!("holds {count} {}; 8-node hexahedra are read", element.name);
+        let problem = format!("holds {count} {}; {READ} are read", element.name);
         fault(Place::Field("$Elements".into(), None), problem, element.advice())
     }
 }

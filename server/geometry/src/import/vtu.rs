@@ -10,11 +10,12 @@ mod numbers;
 
 use std::collections::BTreeMap;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use roxmltree::Node;
 
 use super::assemble::{Cell, Content, Labels};
 use super::error::{DAMAGED, Fault, Place, fault};
+use super::named_mesh::CellVectors;
 use arrays::{Array, Source};
 
 /// Largest number of different values of an array that names groups.
@@ -48,13 +49,14 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Content, Fault> {
         let is_ghost = ghosts(&source, piece, n_cells)?;
         let kept = |i: &usize| !is_ghost.as_ref().is_some_and(|ghosts| ghosts[*i]);
         let offset = |mut cell: Cell| {
-            cell.corners[..cell.shape.n_corners()].iter_mut().for_each(|corner| *corner += first_point as u32);
+            cell.nodes[..cell.shape.n_nodes()].iter_mut().for_each(|node| *node += first_point as u32);
             cell
         };
         let kept_cells: Vec<usize> = (0..n_cells).filter(kept).collect();
         content.cells.extend(kept_cells.iter().map(|&i| offset(cells[i])));
         cell_arrays
             .add(&source, piece, "CellData", n_cells, |i| Some(first_cell + kept_cells.binary_search(&i).ok()?))?;
+        add_vectors(&mut content, &source, piece, n_cells, &kept_cells)?;
         point_arrays.add(&source, piece, "PointData", n_points, |i| Some(first_point + i))?;
     }
     let mut labels = Labels::default();
@@ -77,7 +79,7 @@ fn find_pieces<'a, 'input>(document: &'a roxmltree::Document<'input>) -> Result<
         let problem = format!("holds `{}` of type `{kind}`, not an unstructured grid", root.tag_name().name());
         let advice = match kind {
             "PUnstructuredGrid" => "it only names the files of its pieces: open it in ParaView and save it as one .vtu",
-            _ => "save the mesh as VTK unstructured grid (.vtu) of hexahedra",
+            _ => "save the mesh as VTK unstructured grid (.vtu) of hexahedra or tetrahedra",
         };
         return fault(arrays::place(root, "VTKFile"), problem, advice);
     }
@@ -130,6 +132,32 @@ fn read_points(source: &Source<'_>, piece: Node<'_, '_>, n_points: usize) -> Res
     };
     let values = source.positions(&array, n_points)?;
     Ok(values.chunks_exact(3).map(|x| Point3::new(x[0], x[1], x[2])).collect())
+}
+
+/// Appends cell arrays of three components; cells of pieces without one have none.
+fn add_vectors(
+    content: &mut Content,
+    source: &Source<'_>,
+    piece: Node<'_, '_>,
+    n_cells: usize,
+    kept_cells: &[usize],
+) -> Result<(), Fault> {
+    const N_COMPONENTS: usize = 3;
+    let first_cell = content.cells.len() - kept_cells.len();
+    let tables = piece.children().filter(|node| node.has_tag_name("CellData"));
+    for array in tables.flat_map(Array::all).filter(|array| array.n_components() == N_COMPONENTS && array.is_numeric())
+    {
+        let values = source.numbers(&array, n_cells, N_COMPONENTS)?;
+        let name = array.name();
+        let known = content.cell_vectors.iter().position(|vectors| vectors.name == name).unwrap_or_else(|| {
+            content.cell_vectors.push(CellVectors { name: name.to_owned(), values: Vec::new() });
+            content.cell_vectors.len() - 1
+        });
+        let all = &mut content.cell_vectors[known].values;
+        all.resize(first_cell, Vector3::zeros());
+        all.extend(kept_cells.iter().map(|&i| Vector3::from_column_slice(&values[N_COMPONENTS * i..][..N_COMPONENTS])));
+    }
+    Ok(())
 }
 
 /// Values of arrays of one component, over all pieces, by name.

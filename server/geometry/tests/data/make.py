@@ -1,4 +1,4 @@
-"""Writes the mesh files of this folder with Gmsh and VTK: `pip install gmsh vtk`, then `python make.py`.
+"""Writes the mesh files of this folder with Gmsh and VTK: `pip install gmsh vtk meshio`, then `python make.py`.
 
 Two boxes side by side, 20 x 10 x 10 mm together, in millimetres: volumes `soft` (x < 10) and `stiff`, surfaces `bottom`
 (z = 0) and `end` (x = 20), curve `edge` (y = z = 0), point `corner` (the origin), and a second surface over both tops
@@ -6,6 +6,7 @@ that has no name, with number 77. Each box has 2 x 2 x 2 hexahedra.
 """
 
 import gmsh
+import meshio
 import vtk
 from vtk.util.numpy_support import numpy_to_vtk
 import numpy
@@ -59,6 +60,26 @@ def write_tetrahedra():
     gmsh.option.setNumber("Mesh.MeshSizeMin", 1)
     gmsh.model.mesh.generate(3)
     gmsh.write("tetrahedra.msh")
+
+
+def write_quadratic_tetrahedra():
+    """A box of 20 x 10 x 10 mm with the surface `end` at x = 20; its VTU file is meshio's, which knows Gmsh's order of nodes."""
+    gmsh.model.add("tet10")
+    gmsh.model.occ.addBox(0, 0, 0, 20, 10, 10)
+    gmsh.model.occ.synchronize()
+    end = [tag for _, tag in gmsh.model.getEntitiesInBoundingBox(19.9, -1, -1, 20.1, 11, 11, 2)]
+    gmsh.model.addPhysicalGroup(2, end, name="end")
+    gmsh.model.addPhysicalGroup(3, [1], name="body")
+    gmsh.option.setNumber("Mesh.MeshSizeMin", 8)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", 8)
+    gmsh.option.setNumber("Mesh.ElementOrder", 2)
+    gmsh.model.mesh.generate(3)
+    for version in (4.1, 2.2):
+        gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        gmsh.write(f"tet10-{version}.msh")
+    mesh = meshio.read("tet10-4.1.msh")
+    cells = [block for block in mesh.cells if block.type == "tetra10"]
+    meshio.write("tet10.vtu", meshio.Mesh(mesh.points, cells))
 
 
 def grid():
@@ -117,4 +138,5 @@ vtu = grid()
 write_msh()
 write_tetrahedra()
 write_vtu(vtu)
+write_quadratic_tetrahedra()
 gmsh.finalize()

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use plica_accurate::SolveError;
-use plica_geometry::HexMesh;
+use plica_geometry::VolumeMesh;
 use plica_scene::case::{Case, Failure, LoadStep, News, Problem, Reading, Solution, follow, write_result};
 use plica_scene::extents;
 use serde::Serialize;
@@ -33,7 +33,9 @@ struct Report {
 /// How the solve went.
 #[derive(Debug, Serialize)]
 struct Info {
-    n_hexes: usize,
+    /// Kind of the elements.
+    elements: &'static str,
+    n_elements: usize,
     n_nodes: usize,
     n_unknowns: usize,
     extents_m: [f64; 3],
@@ -104,7 +106,7 @@ fn advise(failure: Failure, problem: &Problem, case: &Path) -> anyhow::Error {
     let advice = match &failure {
         Failure::Stuck { error: SolveError::Singular { .. }, .. } => "hold more nodes or axes",
         Failure::Stuck { .. } if problem.is_linear() => {
-            "a linear case needs one Newton step: loosen solve.tolerance, and look for hexahedra of extreme shape or stiffness"
+            "a linear case needs one Newton step: loosen solve.tolerance, and look for elements of extreme shape or stiffness"
         }
         Failure::Stuck { .. } if problem.may_collapse() => {
             "look at the state with smaller loads, raise solve.steps or solve.max_halvings, refine the mesh where it folds, \
@@ -113,7 +115,7 @@ fn advise(failure: Failure, problem: &Problem, case: &Path) -> anyhow::Error {
         Failure::Stuck { .. } => {
             "look at the state with smaller loads, raise solve.steps or solve.max_halvings, or refine the mesh where it folds"
         }
-        Failure::Solve(_) => "use fewer hexahedra",
+        Failure::Solve(_) => "use fewer elements",
     };
     anyhow::anyhow!("{}: {failure}; {advice}", case.display())
 }
@@ -121,7 +123,8 @@ fn advise(failure: Failure, problem: &Problem, case: &Path) -> anyhow::Error {
 impl Info {
     fn new(problem: &Problem, solution: &Solution) -> Self {
         Self {
-            n_hexes: problem.mesh().n_hexes(),
+            elements: problem.mesh().kind().plural(),
+            n_elements: problem.mesh().n_elements(),
             n_nodes: problem.mesh().n_nodes(),
             n_unknowns: solution.n_unknowns,
             extents_m: extents_m(problem.mesh()),
@@ -135,7 +138,7 @@ impl Info {
     }
 }
 
-fn extents_m(mesh: &HexMesh) -> [f64; 3] {
+fn extents_m(mesh: &VolumeMesh) -> [f64; 3] {
     let [lower, upper] = mesh.bounds();
     (upper - lower).into()
 }
@@ -154,8 +157,8 @@ fn warnings(problem: &Problem, solution: &Solution) -> Vec<String> {
 }
 
 fn print(report: &Report, readings: &[(String, Reading)]) {
-    let Info { n_hexes, n_nodes, n_unknowns, .. } = report.info;
-    println!("case       {}: {n_hexes} hexahedra, {n_nodes} nodes, {n_unknowns} unknowns", report.case);
+    let Info { elements, n_elements, n_nodes, n_unknowns, .. } = report.info;
+    println!("case       {}: {n_elements} {elements}, {n_nodes} nodes, {n_unknowns} unknowns", report.case);
     let info = &report.info;
     println!("extents    {}", extents::in_mm(info.extents_m));
     println!(

@@ -5,7 +5,7 @@ use std::path::Path;
 use plica_accurate::Material;
 
 use super::load::{self, LoadSpec};
-use super::material::{self, Region};
+use super::material::{self, MaterialSpec, Region};
 use super::mesh::{self, MeshSource};
 use super::probe::{self, ProbeSpec};
 use super::raw::{RawCase, RawSolve};
@@ -25,7 +25,7 @@ pub struct Case {
     pub(super) document: Document,
     pub(super) name: String,
     pub(super) mesh: MeshSource,
-    pub(super) material: Material,
+    pub(super) material: MaterialSpec,
     /// Density of everything that no region claims [kg/m3].
     pub(super) density_kg_per_m3: Option<f64>,
     pub(super) regions: Vec<Region>,
@@ -93,8 +93,8 @@ impl Case {
         Ok(Self {
             name: file.file_stem().map_or_else(|| "case".into(), |s| s.to_string_lossy().into_owned()),
             mesh: mesh::check(&check, &raw.mesh)?,
+            regions: material::check_regions(&check, &raw.regions, &raw.material, &material)?,
             material,
-            regions: material::check_regions(&check, &raw.regions, &raw.material, material)?,
             density_kg_per_m3: raw.material.density_kg_per_m3,
             supports: support::check(&check, &raw.supports)?,
             loads: load::check(&check, &raw)?,
@@ -112,7 +112,8 @@ impl Case {
 
     /// The base material and those of the regions.
     pub(super) fn materials(&self) -> impl Iterator<Item = &Material> {
-        std::iter::once(&self.material).chain(self.regions.iter().map(|region| &region.material))
+        let regions = self.regions.iter().map(|region| &region.material);
+        std::iter::once(&self.material).chain(regions).map(|spec| &spec.material)
     }
 
     /// Load stepping and tolerance of the solver.

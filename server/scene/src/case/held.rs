@@ -1,7 +1,7 @@
 //! Check that supports leave no rigid motion.
 
 use nalgebra::{Matrix6, Point3, SymmetricEigen, Vector3, Vector6};
-use plica_geometry::HexMesh;
+use plica_geometry::VolumeMesh;
 
 use super::support::Support;
 use crate::document::Document;
@@ -14,7 +14,7 @@ const LEAST_HOLD: f64 = 1e-6;
 ///
 /// A small rigid motion `u(x) = t + w x (x - c)` moves a node along a held direction `d` by `d . u`. The sum of these squares over
 /// held directions is a quadratic form in `(t, size w)`: where its least eigenvalue is 0, that motion is free.
-pub(super) fn check(document: &Document, mesh: &HexMesh, supports: &[Support]) -> Result<(), ConfigError> {
+pub(super) fn check(document: &Document, mesh: &VolumeMesh, supports: &[Support]) -> Result<(), ConfigError> {
     let (body_of_node, n_bodies) = mesh.bodies();
     for body in 0..n_bodies {
         let nodes: Vec<_> = (0..mesh.n_nodes()).filter(|&n| body_of_node[n] == body).map(|n| mesh.nodes()[n]).collect();

@@ -1,10 +1,10 @@
-//! Loads of a case: as checked, and resolved to faces, nodes and hexahedra.
+//! Loads of a case: as checked, and resolved to faces, nodes and elements.
 
 use nalgebra::Vector3;
-use plica_accurate::{Couple, Energy, NodalForces, Pressure, Traction, body_forces};
+use plica_accurate::{Couple, Energy, NodalForces, Pressure, Traction, face_area, volume_forces};
 use plica_geometry::import::NamedMesh;
 use plica_geometry::select::Selector;
-use plica_geometry::{HexMesh, NodeIdx};
+use plica_geometry::{ElementIdx, Face, NodeIdx, VolumeMesh};
 
 use super::raw::{RawCase, RawLoad};
 use super::select;
@@ -43,13 +43,13 @@ enum LoadKind {
 #[derive(Debug, Clone)]
 pub enum Load {
     /// Force per rest area \[Pa\] on faces.
-    Traction(Vec<[NodeIdx; 4]>, Vector3<f64>),
+    Traction(Vec<Face>, Vector3<f64>),
     /// Pressure \[Pa\] on deformed faces.
-    Pressure(Vec<[NodeIdx; 4]>, f64),
+    Pressure(Vec<Face>, f64),
     /// Forces \[N\] at nodes.
     Forces(Vec<(NodeIdx, Vector3<f64>)>),
     /// Moment \[N m\] on faces.
-    Moment(Vec<[NodeIdx; 4]>, Vector3<f64>),
+    Moment(Vec<Face>, Vector3<f64>),
 }
 
 pub(super) fn check(c: &Check<'_>, raw: &RawCase) -> Result<Vec<LoadSpec>, ConfigError> {
@@ -81,7 +81,7 @@ pub(super) fn check(c: &Check<'_>, raw: &RawCase) -> Result<Vec<LoadSpec>, Confi
     raw.loads.iter().enumerate().map(load).collect()
 }
 
-/// Mesh of a case with the density of each hexahedron \[kg/m^3\], 0 where none is given, and the held nodes.
+/// Mesh of a case with the density of each element \[kg/m^3\], 0 where none is given, and the held nodes.
 pub(super) struct Body<'a> {
     pub(super) mesh: &'a NamedMesh,
     pub(super) densities_kg_per_m3: &'a [f64],
@@ -100,7 +100,7 @@ pub(super) fn find(
     let explain = |e| select::explain(document, &format!("{key}.select"), &mesh.mesh, &e);
     let faces = || spec.selector.faces(&mesh.mesh, &mesh.groups);
     let nodes = || spec.selector.nodes(&mesh.mesh, &mesh.groups);
-    let hexes = || spec.selector.hexes(&mesh.mesh, &mesh.groups);
+    let elements = || spec.selector.elements(&mesh.mesh, &mesh.groups);
     let on_nodes = |force: [f64; 3], nodes: Vec<NodeIdx>| {
         let share = Vector3::from(force) / nodes.len() as f64;
         Load::Forces(nodes.into_iter().map(|node| (node, share)).collect())
@@ -112,21 +112,21 @@ pub(super) fn find(
         LoadKind::NodalForce(force) => on_nodes(force, nodes().map_err(explain)?),
         LoadKind::Force(force) => match faces() {
             Ok(faces) => {
-                let area: f64 = faces.iter().map(|quad| mesh.mesh.quad_area(quad)).sum();
+                let area: f64 = faces.iter().map(|face| face_area(mesh.mesh.nodes(), face)).sum();
                 Load::Traction(faces, Vector3::from(force) / area)
             }
             Err(_) => on_nodes(force, nodes().map_err(explain)?),
         },
         LoadKind::BodyForce(force) => {
-            let hexes = hexes().map_err(explain)?;
-            Load::forces(body_forces(&mesh.mesh, hexes.into_iter().map(|hex| (hex, force.into()))))
+            let elements = elements().map_err(explain)?;
+            Load::forces(volume_forces(&mesh.mesh, elements.into_iter().map(|element| (element, force.into()))))
         }
         LoadKind::Gravity(acceleration) => {
-            let hexes = hexes().map_err(explain)?;
-            let weight = |hex: plica_geometry::HexIdx| {
-                (hex, Vector3::from(acceleration) * body.densities_kg_per_m3[hex.index()])
+            let elements = elements().map_err(explain)?;
+            let weight = |element: ElementIdx| {
+                (element, Vector3::from(acceleration) * body.densities_kg_per_m3[element.index()])
             };
-            Load::forces(body_forces(&mesh.mesh, hexes.into_iter().map(weight)))
+            Load::forces(volume_forces(&mesh.mesh, elements.into_iter().map(weight)))
         }
     };
     remarks.extend(load.remark(spec, body.is_held));
@@ -142,9 +142,9 @@ impl Load {
     fn remark(&self, spec: &LoadSpec, is_held: &[bool]) -> Option<String> {
         let n_held = |nodes: &mut dyn Iterator<Item = NodeIdx>| nodes.filter(|node| is_held[node.index()]).count();
         let (n, of) = match (self, spec.kind) {
-            (Self::Traction(quads, _), LoadKind::Force(_)) => {
-                let is_held = |quad: &&[NodeIdx; 4]| quad.iter().all(|node| is_held[node.index()]);
-                (quads.iter().filter(is_held).count(), "faces")
+            (Self::Traction(faces, _), LoadKind::Force(_)) => {
+                let is_held = |face: &&Face| face.nodes().iter().all(|node| is_held[node.index()]);
+                (faces.iter().filter(is_held).count(), "faces")
             }
             (Self::Forces(forces), LoadKind::Force(_) | LoadKind::NodalForce(_)) => {
                 (n_held(&mut forces.iter().map(|(node, _)| *node)), "nodes")
@@ -157,14 +157,16 @@ impl Load {
     }
 
     /// A share of the load.
-    pub(super) fn at(&self, mesh: &HexMesh, share: f64) -> Box<dyn Energy> {
+    pub(super) fn at(&self, mesh: &VolumeMesh, share: f64) -> Box<dyn Energy> {
         match self {
-            Self::Traction(quads, traction_pa) => Box::new(Traction::new(mesh, quads, traction_pa * share)),
-            Self::Pressure(quads, pressure_pa) => Box::new(Pressure::new(quads.clone(), pressure_pa * share)),
+            Self::Traction(faces, traction_pa) => {
+                Box::new(Traction::on_faces(mesh.nodes(), faces, traction_pa * share))
+            }
+            Self::Pressure(faces, pressure_pa) => Box::new(Pressure::new(faces.clone(), pressure_pa * share)),
             Self::Forces(forces) => {
                 Box::new(NodalForces::new(forces.iter().map(|(node, force)| (*node, force * share)).collect()))
             }
-            Self::Moment(quads, moment_nm) => Box::new(Couple::new(mesh, quads, moment_nm * share)),
+            Self::Moment(faces, moment_nm) => Box::new(Couple::on_faces(mesh.nodes(), faces, moment_nm * share)),
         }
     }
 }

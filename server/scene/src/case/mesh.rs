@@ -45,7 +45,7 @@ impl MeshSource {
                     let advice = "list the corners counter-clockwise around the bottom, then around the top";
                     document.error("mesh.corners_m", e.to_string(), advice)
                 })?;
-                Ok(NamedMesh { mesh, groups: Groups::default(), remarks: Vec::new() })
+                Ok(NamedMesh { mesh: mesh.into(), groups: Groups::default(), remarks: Vec::new(), vectors: Vec::new() })
             }
             Self::File { path, options } => read_mesh(path, *options).map_err(|e| {
                 let ImportError { path, place, problem, advice } = e;

@@ -2,9 +2,8 @@
 
 use nalgebra::Point3;
 use plica_geometry::import::NamedMesh;
-use plica_geometry::isoparametric::shape_functions;
 use plica_geometry::select::Selector;
-use plica_geometry::{HexIdx, Location, NodeIdx, locate};
+use plica_geometry::{ElementPoint, NodeIdx};
 
 use super::raw::{RawCase, RawProbe, RawQuantity};
 use super::select;
@@ -40,7 +39,7 @@ pub(super) enum Source {
     Tool(usize),
 }
 
-/// A probe resolved to nodes or a hexahedron.
+/// A probe resolved to nodes or a point of an element.
 #[derive(Debug, Clone)]
 pub struct Probe {
     /// Name in the output.
@@ -56,8 +55,8 @@ pub(super) enum Sensor {
     /// About a point \[m\].
     Moment(Source, Point3<f64>),
     Volume,
-    /// Cauchy stress at reference coordinates of a hexahedron.
-    Stress(HexIdx, [f64; 3]),
+    /// Cauchy stress at a point.
+    Stress(ElementPoint),
 }
 
 pub(super) fn check(c: &Check<'_>, raw: &RawCase) -> Result<Vec<ProbeSpec>, ConfigError> {
@@ -126,10 +125,10 @@ fn check_source(c: &Check<'_>, key: &str, p: &RawProbe, raw: &RawCase) -> Result
 }
 
 impl ProbeSpec {
-    /// Finds the nodes or the hexahedron of a probe; `key` is its path in the file.
+    /// Finds the nodes or the element of a probe; `key` is its path in the file.
     pub(super) fn resolve(&self, document: &Document, key: &str, mesh: &NamedMesh) -> Result<Probe, ConfigError> {
         let sensor = match &self.target {
-            Target::DisplacementAt(x) => Sensor::Displacement(weights(mesh, &find(document, key, mesh, x)?)),
+            Target::DisplacementAt(x) => Sensor::Displacement(mesh.mesh.weights_at(&find(document, key, mesh, x)?)),
             Target::DisplacementNearest(x) => Sensor::Displacement(vec![(nearest_node(mesh, x), 1.0)]),
             Target::DisplacementOver(selector) => {
                 let nodes = selector.nodes(&mesh.mesh, &mesh.groups);
@@ -140,30 +139,20 @@ impl ProbeSpec {
             Target::Force(source) => Sensor::Force(*source),
             Target::Moment(source, about) => Sensor::Moment(*source, *about),
             Target::Volume => Sensor::Volume,
-            Target::StressAt(x) => {
-                let found = find(document, key, mesh, x)?;
-                Sensor::Stress(found.hex, found.xi)
-            }
+            Target::StressAt(x) => Sensor::Stress(find(document, key, mesh, x)?),
         };
         Ok(Probe { name: self.name.clone(), sensor })
     }
 }
 
-/// Hexahedron of a point, with its reference coordinates there.
-fn find(document: &Document, key: &str, mesh: &NamedMesh, x: &Point3<f64>) -> Result<Location, ConfigError> {
+/// Element of a point, with its reference coordinates there.
+fn find(document: &Document, key: &str, mesh: &NamedMesh, x: &Point3<f64>) -> Result<ElementPoint, ConfigError> {
     let [lower, upper] = mesh.mesh.bounds();
     let reach = OUTSIDE_TOLERANCE * (upper - lower).norm();
-    match locate(&mesh.mesh, x, reach) {
-        Some(found) => Ok(Location { xi: found.xi.map(|c| c.clamp(-1.0, 1.0)), ..found }),
-        None => {
-            let problem = format!("lies outside the body at rest, which spans {}", select::extent(&mesh.mesh));
-            Err(document.error(&format!("{key}.at_m"), problem, "give a point inside, or nearest_to_m for a node"))
-        }
-    }
-}
-
-fn weights(mesh: &NamedMesh, found: &Location) -> Vec<(NodeIdx, f64)> {
-    mesh.mesh.hexes()[found.hex.index()].into_iter().zip(shape_functions(found.xi)).collect()
+    mesh.mesh.locate(x, reach).ok_or_else(|| {
+        let problem = format!("lies outside the body at rest, which spans {}", select::extent(&mesh.mesh));
+        document.error(&format!("{key}.at_m"), problem, "give a point inside, or nearest_to_m for a node")
+    })
 }
 
 fn nearest_node(mesh: &NamedMesh, x: &Point3<f64>) -> NodeIdx {

@@ -1,17 +1,19 @@
 //! A case with its selections resolved.
 
 use nalgebra::Vector3;
-use plica_accurate::{Constraints, Energy, Material, MaterialModel, Solid, reactions};
-use plica_geometry::HexMesh;
+use plica_accurate::{Constraints, Energy, MaterialModel, Solid, reactions};
 use plica_geometry::import::NamedMesh;
+use plica_geometry::{ElementKind, VolumeMesh};
 
 use super::checked::Case;
 use super::load::{self, Body, Load};
+use super::material::MaterialSpec;
 use super::probe::Probe;
 use super::support::{self, Support};
 use super::tool::Tool;
 use super::touch::Touch;
 use super::{held, select};
+use crate::document::Document;
 use crate::error::ConfigError;
 use crate::extents::{self, Size};
 
@@ -23,8 +25,8 @@ pub struct Problem {
     is_linear: bool,
     may_collapse: bool,
     remarks: Vec<String>,
-    /// Region of each hexahedron: 0 for the base material, else one more than the region's index in the file.
-    region_of_hex: Vec<usize>,
+    /// Region of each element: 0 for the base material, else one more than the region's index in the file.
+    region_of_element: Vec<usize>,
     supports: Vec<Support>,
     loads: Vec<Load>,
     tools: Vec<Tool>,
@@ -32,10 +34,10 @@ pub struct Problem {
     probes: Vec<Probe>,
 }
 
-/// Solid with the region and the density of each hexahedron \[kg/m^3\].
+/// Solid with the region and the density of each element \[kg/m^3\].
 struct Parts {
     solid: Solid,
-    region_of_hex: Vec<usize>,
+    region_of_element: Vec<usize>,
     densities_kg_per_m3: Vec<f64>,
 }
 
@@ -50,7 +52,8 @@ impl Problem {
         let mut mesh = case.mesh.load(document)?;
         let mut remarks = std::mem::take(&mut mesh.remarks);
         check_extents(case, &mesh.mesh, &mut remarks)?;
-        let Parts { solid, region_of_hex, densities_kg_per_m3 } = make_solid(case, &mesh)?;
+        remarks.extend(stiff_elements(&mesh.mesh));
+        let Parts { solid, region_of_element, densities_kg_per_m3 } = make_solid(case, &mesh)?;
         let supports = support::find(document, &case.supports, &mesh)?;
         held::check(document, &mesh.mesh, &supports)?;
         let is_held = is_held(&supports, mesh.mesh.n_nodes());
@@ -62,7 +65,8 @@ impl Problem {
         let probes = probes.map(|(i, probe)| probe.resolve(document, &format!("probes.{i}"), &mesh));
         let probes = probes.collect::<Result<_, _>>()?;
         let is_linear = case.materials().all(|material| material.model == MaterialModel::Linear);
-        let may_collapse = case.materials().any(|m| m.model == MaterialModel::CompressibleNeoHookean);
+        let may_collapse =
+            case.materials().any(|m| !matches!(m.model, MaterialModel::Linear | MaterialModel::StableNeoHookean));
         let tools = case.tools.clone();
         let mut problem = Self {
             mesh,
@@ -70,7 +74,7 @@ impl Problem {
             is_linear,
             may_collapse,
             remarks,
-            region_of_hex,
+            region_of_element,
             supports,
             loads,
             tools,
@@ -79,13 +83,13 @@ impl Problem {
         };
         if !problem.tools.is_empty() {
             let softest = case.materials().map(|m| m.young_modulus_pa).fold(f64::INFINITY, f64::min);
-            problem.touch = Some(Touch::new(&problem, softest));
+            problem.touch = Some(touch(document, &problem, softest)?);
         }
         Ok(problem)
     }
 
     /// The mesh at rest.
-    pub fn mesh(&self) -> &HexMesh {
+    pub fn mesh(&self) -> &VolumeMesh {
         &self.mesh.mesh
     }
 
@@ -109,9 +113,9 @@ impl Problem {
         &self.remarks
     }
 
-    /// Region of each hexahedron: 0 for the base material, else one more than the region's index in the file.
-    pub fn region_of_hex(&self) -> &[usize] {
-        &self.region_of_hex
+    /// Region of each element: 0 for the base material, else one more than the region's index in the file.
+    pub fn region_of_element(&self) -> &[usize] {
+        &self.region_of_element
     }
 
     /// Supports in the order of the file.
@@ -193,6 +197,24 @@ impl Problem {
     }
 }
 
+/// Contact with tools, which knows hexahedra only.
+fn touch(document: &Document, problem: &Problem, softest_pa: f64) -> Result<Touch, ConfigError> {
+    let Some(hexes) = problem.mesh().hexahedra() else {
+        let problem = format!("touch a mesh of {}", problem.mesh().kind().plural());
+        return Err(document.error("tools", problem, "mesh the body with hexahedra, or press it by a displacement"));
+    };
+    Ok(Touch::new(problem, hexes, softest_pa))
+}
+
+/// A sentence about elements that are stiffer than the body.
+fn stiff_elements(mesh: &VolumeMesh) -> Option<String> {
+    (mesh.kind() == ElementKind::LinearTetrahedron).then(|| {
+        "4-node tetrahedra lock: they are too stiff in bending, and far too stiff near incompressibility; save the mesh with \
+         10-node tetrahedra (in Gmsh Mesh.ElementOrder = 2, Mesh > Set order 2)"
+            .to_owned()
+    })
+}
+
 /// Whether all of a node's motion is held.
 fn is_held(supports: &[Support], n_nodes: usize) -> Vec<bool> {
     let mut n_directions = vec![0; n_nodes];
@@ -201,7 +223,7 @@ fn is_held(supports: &[Support], n_nodes: usize) -> Vec<bool> {
 }
 
 /// Refuses a mesh of impossible extents, and tells unusual ones.
-fn check_extents(case: &Case, mesh: &HexMesh, remarks: &mut Vec<String>) -> Result<(), ConfigError> {
+fn check_extents(case: &Case, mesh: &VolumeMesh, remarks: &mut Vec<String>) -> Result<(), ConfigError> {
     let [lower, upper] = mesh.bounds();
     let (key, is_file) = case.mesh.size_key();
     match extents::judge("the body", key, (upper - lower).into()) {
@@ -217,20 +239,22 @@ fn check_extents(case: &Case, mesh: &HexMesh, remarks: &mut Vec<String>) -> Resu
 }
 
 fn make_solid(case: &Case, mesh: &NamedMesh) -> Result<Parts, ConfigError> {
-    let mut materials: Vec<Material> = vec![case.material; mesh.mesh.n_hexes()];
-    let mut region_of_hex = vec![0; mesh.mesh.n_hexes()];
-    let mut densities_kg_per_m3 = vec![case.density_kg_per_m3.unwrap_or_default(); mesh.mesh.n_hexes()];
+    let mut specs: Vec<&MaterialSpec> = vec![&case.material; mesh.mesh.n_elements()];
+    let mut region_of_element = vec![0; mesh.mesh.n_elements()];
+    let mut densities_kg_per_m3 = vec![case.density_kg_per_m3.unwrap_or_default(); mesh.mesh.n_elements()];
     for (i, region) in case.regions.iter().enumerate() {
-        let hexes = region.selector.hexes(&mesh.mesh, &mesh.groups);
+        let elements = region.selector.elements(&mesh.mesh, &mesh.groups);
         let key = format!("regions.{i}.select");
-        for hex in hexes.map_err(|e| select::explain(&case.document, &key, &mesh.mesh, &e))? {
-            materials[hex.index()] = region.material;
-            region_of_hex[hex.index()] = i + 1;
-            densities_kg_per_m3[hex.index()] = region.density_kg_per_m3.or(case.density_kg_per_m3).unwrap_or_default();
+        for element in elements.map_err(|e| select::explain(&case.document, &key, &mesh.mesh, &e))? {
+            specs[element.index()] = &region.material;
+            region_of_element[element.index()] = i + 1;
+            densities_kg_per_m3[element.index()] =
+                region.density_kg_per_m3.or(case.density_kg_per_m3).unwrap_or_default();
         }
     }
-    let solid = Solid::new(&mesh.mesh, &materials);
+    let materials = mesh.mesh.elements().zip(specs).map(|(element, spec)| spec.at(&case.document, mesh, element));
+    let solid = Solid::of_volume(&mesh.mesh, &materials.collect::<Result<Vec<_>, _>>()?);
     let refused =
         |e: plica_accurate::SolidError| case.document.error("material", e.to_string(), "change the constants");
-    Ok(Parts { solid: solid.map_err(refused)?, region_of_hex, densities_kg_per_m3 })
+    Ok(Parts { solid: solid.map_err(refused)?, region_of_element, densities_kg_per_m3 })
 }

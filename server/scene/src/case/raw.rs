@@ -69,7 +69,7 @@ pub struct RawMesh {
     /// Length of the last hexahedron over that of the first, along each direction.
     #[schemars(inner(range(min = 1e-3, max = 1e3)))]
     pub grading: Option<[f64; 3]>,
-    /// Mesh file of hexahedra (.vtu, .msh), relative to the case file.
+    /// Mesh file of hexahedra or tetrahedra (.vtu, .msh), relative to the case file.
     pub file: Option<String>,
     /// Metres per unit of the file.
     #[schemars(range(min = 1e-9, max = 1e3))]
@@ -92,7 +92,7 @@ pub enum RawGenerator {
     Hexahedron,
 }
 
-/// An isotropic material by two of its constants.
+/// A material by two constants, and what its law has besides.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawMaterial {
@@ -110,6 +110,11 @@ pub struct RawMaterial {
     /// Lamé's first parameter [Pa], with `mu_pa`.
     #[schemars(range(min = -5e12, max = 5e18))]
     pub lambda_pa: Option<f64>,
+    /// Exponent of the exponential law [-].
+    #[schemars(range(min = 1e-3, max = 1e4))]
+    pub exponent: Option<f64>,
+    /// Fibres of the fibre-reinforced law.
+    pub fibres: Option<RawFibres>,
     /// Density [kg/m3], for `gravity_m_per_s2`.
     #[schemars(range(min = 1e-3, max = 1e5))]
     pub density_kg_per_m3: Option<f64>,
@@ -125,6 +130,39 @@ pub enum RawModel {
     CompressibleNeoHookean,
     /// Finite energy under any compression.
     StableNeoHookean,
+    /// Stiffens exponentially, as soft tissue does.
+    Exponential,
+    /// Compressible Neo-Hookean, stiffer along fibres.
+    FibreReinforced,
+}
+
+/// Fibres of a transversely isotropic material, with a direction by exactly one of `direction`, `about`, `array`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawFibres {
+    /// Young's modulus along the fibres [Pa]; at least `young_modulus_pa`, which is that across them.
+    #[schemars(range(min = 1e-3, max = 1e13))]
+    pub fibre_modulus_pa: f64,
+    /// One direction for all fibres.
+    #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
+    pub direction: Option<[f64; 3]>,
+    /// Circles around an axis.
+    pub about: Option<RawFibreAxis>,
+    /// Name of a cell array of three components of a .vtu file.
+    pub array: Option<String>,
+}
+
+/// Axis of circular fibres.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawFibreAxis {
+    /// Direction of the axis.
+    #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
+    pub axis: [f64; 3],
+    /// A point of the axis [m].
+    #[serde(default)]
+    #[schemars(inner(range(min = -LARGEST_M, max = LARGEST_M)))]
+    pub through_m: [f64; 3],
 }
 
 /// A part of another material.
@@ -149,6 +187,11 @@ pub struct RawRegion {
     /// Lamé's first parameter [Pa], with `mu_pa`.
     #[schemars(range(min = -5e12, max = 5e18))]
     pub lambda_pa: Option<f64>,
+    /// Exponent of the exponential law [-].
+    #[schemars(range(min = 1e-3, max = 1e4))]
+    pub exponent: Option<f64>,
+    /// Fibres of the fibre-reinforced law.
+    pub fibres: Option<RawFibres>,
     /// Density [kg/m3], that of `material` where left out.
     #[schemars(range(min = 1e-3, max = 1e5))]
     pub density_kg_per_m3: Option<f64>,

@@ -48,7 +48,7 @@ impl Probe {
                 let value = Value::Scalar(problem.solid().volume(x));
                 Reading { quantity: "volume", unit: "m3", value }
             }
-            Sensor::Stress(hex, xi) => Reading::tensor(&problem.solid().cauchy_stress(x, *hex, *xi)),
+            Sensor::Stress(point) => Reading::tensor(&problem.solid().recovered_stress(x, point.element, point.xi)),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Selectors of parts of a mesh.
 
-use plica_geometry::HexMesh;
+use plica_geometry::VolumeMesh;
 use plica_geometry::predicate::Predicate;
 use plica_geometry::select::{SelectError, Selector, Side};
 
@@ -41,7 +41,7 @@ fn side(face: RawFace) -> Side {
 }
 
 /// Error of a selector that selects nothing, with advice.
-pub(super) fn explain(document: &Document, key: &str, mesh: &HexMesh, error: &SelectError) -> ConfigError {
+pub(super) fn explain(document: &Document, key: &str, mesh: &VolumeMesh, error: &SelectError) -> ConfigError {
     let advice = match error {
         SelectError::UnknownGroup { .. } => "take one of these, or name the part in the mesh file".to_owned(),
         SelectError::NoVolume { .. } => "take a group of volumes".to_owned(),
@@ -53,7 +53,7 @@ pub(super) fn explain(document: &Document, key: &str, mesh: &HexMesh, error: &Se
 }
 
 /// Lower and upper corner of the bounding box, for a message.
-pub(super) fn extent(mesh: &HexMesh) -> String {
+pub(super) fn extent(mesh: &VolumeMesh) -> String {
     let [lower, upper] = mesh.bounds().map(|x| format!("[{:.4e}, {:.4e}, {:.4e}]", x.x, x.y, x.z));
     format!("{lower} to {upper} m")
 }

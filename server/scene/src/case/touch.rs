@@ -8,6 +8,7 @@ use plica_accurate::contact::{
     Press,
 };
 use plica_accurate::{Constraints, Energy, Solver};
+use plica_geometry::HexMesh;
 
 use super::problem::Problem;
 use super::tool::Tool;
@@ -42,9 +43,8 @@ struct Placed {
 }
 
 impl Touch {
-    /// Contact points on the boundary; `young_modulus_pa` is that of the softest material \[Pa\].
-    pub(super) fn new(problem: &Problem, young_modulus_pa: f64) -> Self {
-        let mesh = problem.mesh();
+    /// Contact points on the boundary of the problem's `mesh`; `young_modulus_pa` is that of the softest material \[Pa\].
+    pub(super) fn new(problem: &Problem, mesh: &HexMesh, young_modulus_pa: f64) -> Self {
         let params = ContactParams {
             pressure_tolerance: PRESSURE_TOLERANCE,
             newton_tolerance: NEWTON_TOLERANCE,

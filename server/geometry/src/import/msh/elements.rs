@@ -12,10 +12,23 @@ pub(super) struct Element {
     pub(super) kind: Kind,
 }
 
+/// Volumes that are read.
+pub(super) const READ: &str = "8-node hexahedra, 4-node and 10-node tetrahedra";
+
+/// Place of Gmsh's node `k` in the order of VTK, which names the middles of the edges 1-3 and 2-3 of a tetrahedron the other way
+/// round.
+pub(super) fn place(shape: Shape, k: usize) -> usize {
+    match (shape, k) {
+        (Shape::QuadraticTetrahedron, 8) => 9,
+        (Shape::QuadraticTetrahedron, 9) => 8,
+        _ => k,
+    }
+}
+
 /// Import of an element type.
 #[derive(Debug)]
 pub(super) enum Kind {
-    /// Read by its corners.
+    /// Read by its first nodes, as many as the shape has.
     Supported(Shape),
     /// Another volume of first order.
     OtherVolume,
@@ -30,10 +43,12 @@ impl Element {
 
     pub(super) fn advice(&self) -> &'static str {
         match self.kind {
-            Kind::HighOrder => "save it with first order: in Gmsh Mesh.ElementOrder = 1 (Mesh > Set order 1)",
+            Kind::HighOrder => {
+                "save hexahedra with first order (in Gmsh Mesh.ElementOrder = 1, Mesh > Set order 1), tetrahedra with second"
+            }
             _ => {
-                "mesh with hexahedra only: in Gmsh transfinite volumes with Recombine, an extrusion with Recombine, or \
-                 Mesh.SubdivisionAlgorithm = 2"
+                "mesh with tetrahedra only, of second order (in Gmsh Mesh.ElementOrder = 2), or with hexahedra only (transfinite \
+                 volumes or an extrusion with Recombine, or Mesh.SubdivisionAlgorithm = 2)"
             }
         }
     }
@@ -55,11 +70,11 @@ const fn high(code: i32, name: &'static str, n_nodes: usize) -> Element {
 const ELEMENTS: [Element; 30] = [
     supported(15, "points", 1, Shape::Point),
     supported(1, "2-node lines", 2, Shape::Line),
-    supported(8, "3-node lines", 3, Shape::Line),
+    supported(8, "3-node lines", 3, Shape::CurvedLine),
     supported(26, "4-node lines", 4, Shape::Line),
     supported(27, "5-node lines", 5, Shape::Line),
     supported(2, "3-node triangles", 3, Shape::Triangle),
-    supported(9, "6-node triangles", 6, Shape::Triangle),
+    supported(9, "6-node triangles", 6, Shape::CurvedTriangle),
     supported(20, "9-node triangles", 9, Shape::Triangle),
     supported(21, "10-node triangles", 10, Shape::Triangle),
     supported(3, "4-node quads", 4, Shape::Quad),
@@ -67,10 +82,10 @@ const ELEMENTS: [Element; 30] = [
     supported(16, "8-node quads", 8, Shape::Quad),
     supported(36, "16-node quads", 16, Shape::Quad),
     supported(5, "8-node hexahedra", 8, Shape::Hexahedron),
-    other(4, "4-node tetrahedra", 4),
+    supported(4, "4-node tetrahedra", 4, Shape::Tetrahedron),
+    supported(11, "10-node tetrahedra", 10, Shape::QuadraticTetrahedron),
     other(6, "6-node prisms", 6),
     other(7, "5-node pyramids", 5),
-    high(11, "10-node tetrahedra (second order)", 10),
     high(12, "27-node hexahedra (second order)", 27),
     high(13, "18-node prisms (second order)", 18),
     high(14, "14-node pyramids (second order)", 14),

@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use super::MshContent;
-use super::elements::Element;
+use super::elements::{Element, READ};
 use super::reader::Reader;
 use crate::import::error::{DAMAGED, Fault, fault};
 
@@ -77,7 +77,7 @@ fn element(reader: &mut Reader<'_>) -> Result<&'static Element, Fault> {
     let code = reader.number::<i32>()?;
     match Element::by_code(code) {
         Some(element) => Ok(element),
-        None => fault(reader.place(), format!("element type {code} is not known"), "8-node hexahedra are read"),
+        None => fault(reader.place(), format!("element type {code} is not known"), format!("{READ} are read")),
     }
 }
 

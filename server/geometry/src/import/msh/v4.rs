@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use super::MshContent;
-use super::elements::Element;
+use super::elements::{Element, READ};
 use super::reader::Reader;
 use crate::import::error::{DAMAGED, Fault, fault};
 
@@ -72,7 +72,7 @@ pub(super) fn read_elements(content: &mut MshContent, reader: &mut Reader<'_>) -
         let code = reader.number::<i32>()?;
         let n_in_block = reader.number::<u64>()?;
         let Some(element) = Element::by_code(code) else {
-            return fault(reader.place(), format!("element type {code} is not known"), "8-node hexahedra are read");
+            return fault(reader.place(), format!("element type {code} is not known"), format!("{READ} are read"));
         };
         let groups = content.physical_of_entity.get(&entity).cloned().unwrap_or_default();
         let mut tags = vec![0; element.n_nodes];

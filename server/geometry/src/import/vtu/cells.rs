@@ -4,7 +4,7 @@ use roxmltree::Node;
 
 use super::arrays::{Array, Source, place};
 use super::child;
-use crate::import::assemble::{Cell, Shape};
+use crate::import::assemble::{Cell, MAX_NODES, Shape};
 use crate::import::error::{DAMAGED, Fault, fault};
 
 /// Import of a VTK cell type.
@@ -19,28 +19,32 @@ enum Kind {
 }
 
 /// Corners of `VTK_VOXEL` in the order of `VTK_HEXAHEDRON`.
-const VOXEL_CORNERS: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
+const VOXEL_CORNERS: [usize; MAX_NODES] = [0, 1, 3, 2, 4, 5, 7, 6, 8, 9];
 
 /// Corners of `VTK_PIXEL` in the order of `VTK_QUAD`.
-const PIXEL_CORNERS: [usize; 8] = [0, 1, 3, 2, 4, 5, 6, 7];
+const PIXEL_CORNERS: [usize; MAX_NODES] = [0, 1, 3, 2, 4, 5, 6, 7, 8, 9];
 
 /// Cells of Lagrange (68 to 74) and Bezier (75 to 81) kind and the older ones of any order (60 to 67) have their corners first,
 /// in the order of the plain cell; with no more points than corners they are that cell.
 fn kind(code: u64, n_points: usize) -> Kind {
     match (code, n_points) {
         (1, _) => Kind::Taken(Shape::Point),
+        (21, 3) => Kind::Taken(Shape::CurvedLine),
         (3 | 21 | 35 | 60 | 68 | 75, _) | (4, 2) => Kind::Taken(Shape::Line),
+        (22, 6) => Kind::Taken(Shape::CurvedTriangle),
         (5 | 22 | 34 | 61 | 69 | 76, _) | (6 | 7, 3) => Kind::Taken(Shape::Triangle),
         (9 | 23 | 28 | 62 | 70 | 77, _) | (7, 4) => Kind::Taken(Shape::Quad),
         (12, _) | (67 | 72 | 79, 8) => Kind::Taken(Shape::Hexahedron),
         (8, _) => Kind::Pixel,
         (11, _) => Kind::Voxel,
-        (10, _) | (64 | 71 | 78, 4) => Kind::Other("tetrahedra"),
+        (10, _) | (64 | 71 | 78, 4) => Kind::Taken(Shape::Tetrahedron),
+        // Lagrange tetrahedra of second order have the nodes of the plain ones.
+        (24, _) | (71, 10) => Kind::Taken(Shape::QuadraticTetrahedron),
         (13, _) | (65 | 73 | 80, 6) => Kind::Other("wedges (prisms)"),
         (14, _) | (66 | 74 | 81, 5) => Kind::Other("pyramids"),
         (42, _) => Kind::Other("polyhedra"),
         (25 | 29 | 33 | 67 | 72 | 79, _) => Kind::HighOrder("hexahedra of second or higher order"),
-        (24 | 64 | 71 | 78, _) => Kind::HighOrder("tetrahedra of second or higher order"),
+        (64 | 71 | 78, _) => Kind::HighOrder("tetrahedra of higher order or Bezier kind"),
         (26 | 31 | 32 | 65 | 73 | 80, _) => Kind::HighOrder("wedges (prisms) of second or higher order"),
         (27 | 37 | 66 | 74 | 81, _) => Kind::HighOrder("pyramids of second or higher order"),
         _ => Kind::Other("cells that are neither points, lines, triangles, quads nor hexahedra"),
@@ -78,50 +82,60 @@ pub(super) fn read(
     cells.map(|(i, (&code, points))| cell(node, i, code, points, n_points)).collect()
 }
 
-/// A mesh with other volumes than 8-node hexahedra would have holes where they are.
+/// A mesh with other volumes than those read would have holes where they are.
 fn refuse_unfit(node: Node<'_, '_>, types: &[u64], ranges: &[&[u64]]) -> Result<(), Fault> {
     let kinds = || types.iter().zip(ranges).map(|(&code, points)| kind(code, points.len()));
     let Some(i) = kinds().position(|kind| matches!(kind, Kind::Other(_) | Kind::HighOrder(_))) else { return Ok(()) };
     let (code, n_points) = (types[i], ranges[i].len());
     let n_same = types.iter().zip(ranges).filter(|(other, points)| **other == code && points.len() == n_points).count();
-    let n_hexahedra = kinds().filter(|kind| matches!(kind, Kind::Taken(Shape::Hexahedron) | Kind::Voxel)).count();
-    let beside = if n_hexahedra > 0 { format!(" beside {n_hexahedra} hexahedra") } else { String::new() };
+    let volume = |kind: Kind| match kind {
+        Kind::Voxel => Some(Shape::Hexahedron),
+        Kind::Taken(shape) => (shape.dimension() == 3).then_some(shape),
+        _ => None,
+    };
+    let n_read = kinds().filter_map(volume).count();
+    let beside =
+        kinds().find_map(volume).map(|shape| format!(" beside {n_read} {}", shape.plural())).unwrap_or_default();
     let (name, advice) = match kind(code, n_points) {
-        Kind::HighOrder(name) => (name, "save the mesh with cells of first order"),
-        Kind::Other(name) if n_hexahedra > 0 => (
+        Kind::HighOrder(name) => (name, "save hexahedra with first order, tetrahedra with second"),
+        Kind::Other(name) if n_read > 0 => (
             name,
-            "mesh the whole body with hexahedra (in Gmsh: Recombine, or Mesh.SubdivisionAlgorithm = 2, which splits all cells              alike): without these cells the body would have holes",
+            "mesh the whole body with tetrahedra or with hexahedra (in Gmsh: Recombine, or Mesh.SubdivisionAlgorithm = 2, which \
+             splits all cells alike): without these cells the body would have holes",
         ),
         Kind::Other(name) => {
-            (name, "mesh the body with hexahedra (in Gmsh: Recombine, or Mesh.SubdivisionAlgorithm = 2)")
+            (name, "mesh the body with tetrahedra or hexahedra (in Gmsh: Recombine, or Mesh.SubdivisionAlgorithm = 2)")
         }
         _ => ("cells", DAMAGED),
     };
-    let problem = format!("holds {n_same} {name}{beside} (cell {i}, type {code}); 8-node hexahedra are read");
+    let problem = format!(
+        "holds {n_same} {name}{beside} (cell {i}, type {code}); 8-node hexahedra, 4-node and 10-node \
+         tetrahedra are read"
+    );
     fault(place(node, "types"), problem, advice)
 }
 
 fn cell(node: Node<'_, '_>, i: usize, code: u64, points: &[u64], n_points: usize) -> Result<Cell, Fault> {
     let (shape, order) = match kind(code, points.len()) {
-        Kind::Taken(shape) => (shape, [0, 1, 2, 3, 4, 5, 6, 7]),
+        Kind::Taken(shape) => (shape, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]),
         Kind::Pixel => (Shape::Quad, PIXEL_CORNERS),
         Kind::Voxel => (Shape::Hexahedron, VOXEL_CORNERS),
         Kind::Other(name) | Kind::HighOrder(name) => {
             return fault(place(node, "types"), format!("cell {i} belongs to {name} (type {code})"), DAMAGED);
         }
     };
-    if points.len() < shape.n_corners() {
+    if points.len() < shape.n_nodes() {
         let problem = format!("cell {i} of type {code} has {} points", points.len());
         return fault(place(node, "offsets"), problem, DAMAGED);
     }
-    let mut corners = [0; 8];
-    for k in 0..shape.n_corners() {
+    let mut nodes = [0; MAX_NODES];
+    for k in 0..shape.n_nodes() {
         let point = points[order[k]];
         if point >= n_points as u64 {
             let problem = format!("cell {i} names point {point}, there are {n_points}");
             return fault(place(node, "connectivity"), problem, DAMAGED);
         }
-        corners[k] = point as u32;
+        nodes[k] = point as u32;
     }
-    Ok(Cell { shape, corners, number: i as u64 })
+    Ok(Cell { shape, nodes, number: i as u64 })
 }

@@ -1,0 +1,20 @@
+// A quarter of a ring, from 10 to 20 mm, 2 mm thick, of hexahedra: `gmsh -3 -bin ring.geo -o ring.msh`.
+Point(1) = {0, 0, 0};
+Point(2) = {10, 0, 0};
+Point(3) = {20, 0, 0};
+Point(4) = {0, 20, 0};
+Point(5) = {0, 10, 0};
+Line(1) = {2, 3};
+Circle(2) = {3, 1, 4};
+Line(3) = {4, 5};
+Circle(4) = {5, 1, 2};
+Curve Loop(1) = {1, 2, 3, 4};
+Plane Surface(1) = {1};
+Transfinite Curve{1, -3} = 17 Using Progression 1.05;
+Transfinite Curve{2, 4} = 25;
+Transfinite Surface{1};
+Recombine Surface{1};
+out() = Extrude{0, 0, 2}{ Surface{1}; Layers{1}; Recombine; };
+Physical Volume("body") = {out(1)};
+Physical Surface("inner") = {out(5)};
+Mesh.MshFileVersion = 4.1;
