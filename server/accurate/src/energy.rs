@@ -48,6 +48,17 @@ pub trait Energy {
     ) {
     }
 
+    /// Stresses and pressures after a step `v: [n_nodes]` \[m\] from `x`, linear in the step, for
+    /// [`Energy::add_carried_hessian`]: numbers that may be added and scaled. Empty for energies without any.
+    fn carried_stresses(&self, _x: &[Vector3<f64>], _v: &[Vector3<f64>]) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// Adds the second derivatives \[N/m\] with stresses that do not belong to `x`: the exact ones where `carried` is empty.
+    fn add_carried_hessian(&self, x: &[Vector3<f64>], _carried: &[f64], hessian: &mut Hessian) {
+        self.add_hessian(x, Projection::Exact, hessian);
+    }
+
     /// Smallest `det F` over the integration points, for energies that have any.
     fn smallest_jacobian(&self, _x: &[Vector3<f64>]) -> Option<f64> {
         None

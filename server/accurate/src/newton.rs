@@ -2,6 +2,7 @@
 
 mod arc_length;
 mod direction;
+mod full_steps;
 mod gmres;
 mod line_search;
 mod report;
@@ -18,6 +19,7 @@ use crate::energy::Energy;
 use crate::factor::{Factor, FactorError};
 use crate::hessian::Hessian;
 pub use arc_length::{ArcState, Loading};
+use full_steps::FullSteps;
 pub use report::{Info, Params, Progress, SolveError};
 pub use stability::Mode;
 use sufficient_decrease::Total;
@@ -111,20 +113,51 @@ impl Solver {
         x: &mut [Vector3<f64>],
         observer: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<Info, SolveError> {
+        self.minimise_from(energies, constraints, params, x, Vec::new(), observer)
+    }
+
+    /// [`Solver::minimise`] with the first tangent's stresses, as [`Energy::carried_stresses`] has them for each energy, where `x` is
+    /// a guess whose own stresses are wrong; without effect unless `params` has full steps.
+    ///
+    /// # Errors
+    /// See [`SolveError`].
+    ///
+    /// # Panics
+    /// If the lengths of `x` and `constraints` are not those of the analysis.
+    pub fn minimise_from(
+        &mut self,
+        energies: &[&dyn Energy],
+        constraints: &Constraints,
+        params: &Params,
+        x: &mut [Vector3<f64>],
+        stresses: Vec<Vec<f64>>,
+        observer: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<Info, SolveError> {
         assert_eq!((x.len(), constraints.n_nodes()), (self.gradient.len(), self.gradient.len()), "nodes");
         let problem = Problem { energies, constraints, params };
         if !Total::of(energies, x).value.is_finite() {
             return Err(SolveError::NotFinite { iterations: 0 });
         }
         let mut info = Info::default();
+        let mut full_steps = FullSteps::new(params.max_full_steps, x, stresses);
         loop {
             let moves = self.find_motion(constraints, x);
             let residual = self.find_residual(&problem, x);
+            if full_steps.are_lost(residual.relative) {
+                x.copy_from_slice(full_steps.give_up(&mut info));
+                continue;
+            }
             info.residuals.push(residual.relative);
             if is_done(&problem, &info, moves, observer)? {
+                if full_steps.are_on() && full_steps.lead_to_a_saddle(&problem) {
+                    x.copy_from_slice(full_steps.give_up(&mut info));
+                    continue;
+                }
                 break;
             }
-            self.step(&problem, moves, residual, x, &mut info)?;
+            if !(full_steps.are_on() && self.step_in_full(&problem, moves, &mut full_steps, x, &mut info)) {
+                self.step(&problem, moves, residual, x, &mut info)?;
+            }
             info.iterations += 1;
         }
         info.smallest_jacobian = energies.iter().filter_map(|e| e.smallest_jacobian(x)).reduce(f64::min);
@@ -200,7 +233,7 @@ fn is_done(
     moves: bool,
     observer: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<bool, SolveError> {
-    let Params { tolerance, max_iterations } = *problem.params;
+    let Params { tolerance, max_iterations, .. } = *problem.params;
     let (iterations, residual) = (info.iterations, info.residuals.last().copied().unwrap_or(f64::NAN));
     if !residual.is_finite() {
         return Err(SolveError::NotFinite { iterations });
@@ -209,7 +242,7 @@ fn is_done(
         return Err(SolveError::Cancelled { iterations });
     }
     let is_done = !moves && residual <= tolerance;
-    if !is_done && iterations == max_iterations {
+    if !is_done && iterations == max_iterations + info.lost_steps {
         return Err(SolveError::NotConverged { iterations, residual, tolerance });
     }
     Ok(is_done)

@@ -1,5 +1,6 @@
 //! The elastic energy of a mesh.
 
+mod carried;
 mod element;
 mod recovery;
 mod tetrahedra;
@@ -10,6 +11,7 @@ use plica_geometry::{ElementIdx, HexMesh, NodeIdx, TetMesh, Tets, VolumeMesh, is
 use crate::energy::{Energy, Projection};
 use crate::hessian::Hessian;
 use crate::material::{Law, Material, MaterialError};
+use carried::Carried;
 use element::Element;
 
 /// Reference coordinates of the 2 x 2 x 2 Gauss points, in the order of the corners.
@@ -204,6 +206,24 @@ impl Energy for Solid {
         with_elements!(&self.elements, list => {
             for element in list {
                 let blocks = element.hessian(x, projection);
+                hessian.add_stencil(element.nodes(), |a, b| blocks[a][b]);
+            }
+        });
+    }
+
+    fn carried_stresses(&self, x: &[Vector3<f64>], v: &[Vector3<f64>]) -> Vec<f64> {
+        let mut carried = Vec::new();
+        with_elements!(&self.elements, list => list.iter().for_each(|e| e.carried(x, v).append_to(&mut carried)));
+        carried
+    }
+
+    fn add_carried_hessian(&self, x: &[Vector3<f64>], carried: &[f64], hessian: &mut Hessian) {
+        if carried.is_empty() {
+            return self.add_hessian(x, Projection::Exact, hessian);
+        }
+        with_elements!(&self.elements, list => {
+            for (element, carried) in list.iter().zip(carried.chunks_exact(carried.len() / list.len())) {
+                let blocks = element.carried_hessian(x, &Carried::from_values(carried));
                 hessian.add_stencil(element.nodes(), |a, b| blocks[a][b]);
             }
         });

@@ -46,8 +46,8 @@ pub enum Command {
     Evaluate(EvaluateArgs),
     /// Charts speed against accuracy, one point per configuration, as SVG and JSON.
     Chart(ChartArgs),
-    /// Prints the JSON Schema of scene files.
-    Schema,
+    /// Prints the JSON Schema of scene files, or of case files.
+    Schema(SchemaArgs),
     /// Solves a case with the accurate model: mesh, materials, supports and loads; prints the readings of its probes.
     Solve(SolveArgs),
     /// Becomes the process of a job.
@@ -351,6 +351,17 @@ pub struct SolveArgs {
     /// Result for ParaView (.vtu): displacement, Cauchy and von Mises stress, det F, regions.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+    /// Leaves unstable equilibria along their softest mode, for stable ones.
+    #[arg(long)]
+    pub follow_stable: bool,
+}
+
+/// `plicad schema`.
+#[derive(Debug, Args)]
+pub struct SchemaArgs {
+    /// Of case files, in place of scene files.
+    #[arg(long)]
+    pub case: bool,
 }
 
 /// `plicad demo`.

@@ -29,7 +29,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Train(args) => train::run(args, cli.json),
         Command::Evaluate(args) => evaluate::run(args, cli.json),
         Command::Chart(args) => chart::run(args, cli.json),
-        Command::Schema => schema::run(cli.json),
+        Command::Schema(args) => schema::run(args, cli.json),
         Command::Solve(args) => solve::run(args, cli.json),
         Command::Child(args) => child::run(args),
     }

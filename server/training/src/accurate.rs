@@ -207,7 +207,7 @@ impl Accurate {
         observer: SolveObserver<'_>,
     ) -> Result<SolveInfo, AccurateFailure> {
         let energies = energies(&self.solid, &self.weight, loads);
-        let params = Params { tolerance: TOLERANCE, max_iterations: MAX_ITERATIONS };
+        let params = Params { tolerance: TOLERANCE, max_iterations: MAX_ITERATIONS, ..Params::default() };
         let mut watch = |_: Progress| observer();
         match self.solver.minimise(&energies, &self.constraints, &params, x, &mut watch) {
             Ok(info) => Ok(SolveInfo {

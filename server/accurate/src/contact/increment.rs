@@ -176,7 +176,7 @@ impl<'a> Increment<'a> {
         // With tolerance 1 the floor of the residual is rounding alone.
         let first = solver.residual(&energies, constraints, 1.0, x);
         let tolerance = tolerance(first).max(self.newton_tolerance);
-        let newton = Params { tolerance, max_iterations: params.max_newton_iterations };
+        let newton = Params { tolerance, max_iterations: params.max_newton_iterations, ..Params::default() };
         let mut steps = 0;
         let mut count = |progress: Progress| {
             steps = progress.iteration;

@@ -76,7 +76,7 @@ impl Solver {
     }
 
     /// Turns `H^-1 b` into `(H + R)^-1 b` with the remainder `R` of follower loads, unless that points uphill.
-    fn follow_loads(&mut self, problem: &Problem<'_>, loads: Projection, x: &[Vector3<f64>]) {
+    pub(super) fn follow_loads(&mut self, problem: &Problem<'_>, loads: Projection, x: &[Vector3<f64>]) {
         let (hessian, factor, product) = (&self.hessian, &mut self.factor, &mut self.single);
         let mut direction = self.direction.clone();
         gmres::solve(&mut direction, |v, out| {

@@ -80,7 +80,7 @@ impl Solver {
         if start.has_potential { slope_left.abs() <= SLOPE_LEFT * start.slope.abs() } else { found.norm < start.norm }
     }
 
-    fn try_step(&mut self, x: &[Vector3<f64>], length: f64) {
+    pub(super) fn try_step(&mut self, x: &[Vector3<f64>], length: f64) {
         for ((trial, x), p) in self.trial.iter_mut().zip(x).zip(&self.direction) {
             *trial = x + p * length;
         }

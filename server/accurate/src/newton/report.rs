@@ -9,11 +9,14 @@ pub struct Params {
     pub tolerance: f64,
     /// Largest number of Newton steps.
     pub max_iterations: u32,
+    /// Largest number of first steps that are taken in full, with stresses carried along linearly in the tangent, before the line
+    /// search takes over from the start; 0 for the line search alone.
+    pub max_full_steps: u32,
 }
 
 impl Default for Params {
     fn default() -> Self {
-        Self { tolerance: 1e-9, max_iterations: 100 }
+        Self { tolerance: 1e-9, max_iterations: 100, max_full_steps: 0 }
     }
 }
 
@@ -28,6 +31,8 @@ pub struct Info {
     pub indefinite_steps: u32,
     /// Halvings of steps by the line search.
     pub halvings: u32,
+    /// Steps taken in full that did not converge, so that the line search started anew.
+    pub lost_steps: u32,
     /// Smallest `det F` of the result, where an energy has one.
     pub smallest_jacobian: Option<f64>,
 }

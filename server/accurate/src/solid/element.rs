@@ -4,8 +4,12 @@ use nalgebra::{Matrix3, Vector3};
 use plica_geometry::{HexIdx, HexMesh, NodeIdx, isoparametric};
 
 use super::GAUSS_POINTS;
+use super::carried::Carried;
 use crate::energy::Projection;
 use crate::material::{Deformation, Law, MaterialModel, Tangent};
+
+/// Below this `det F` no second Piola-Kirchhoff stress is formed.
+const LEAST_JACOBIAN: f64 = 1e-3;
 
 /// Gradients `dN_a/dX` \[1/m\] and weight \[m^3\] of a Gauss point.
 #[derive(Debug, Clone)]
@@ -160,6 +164,73 @@ impl<const N: usize, const Q: usize> Element<N, Q> {
         local + Matrix3::from_diagonal_element(pressure)
     }
 
+    /// Pressure `p + dp` and stresses `S + dS` after a step `v` from `x`, linear in `v`: `dp = U'' dj`, and with `P = F S`,
+    /// `dS = F^-1 (dP - dF S)`. Stresses are not finite where `F` is near to singular, and for the linear material.
+    pub(super) fn carried(&self, x: &[Vector3<f64>], v: &[Vector3<f64>]) -> Carried<Q> {
+        let state = self.state(x);
+        let volumetric = self.law.volumetric(state.dilatation);
+        let steps: [Vector3<f64>; N] = std::array::from_fn(|a| v[self.nodes[a].index()]);
+        let changes: [Matrix3<f64>; Q] = std::array::from_fn(|q| gradient(&steps, &self.points[q].gradients));
+        let along = |q: usize| self.law.dilatation_gradient(&state.points[q]).dot(&changes[q]) * self.points[q].weight;
+        let mean = (0..Q).map(along).sum::<f64>() / self.volume;
+        let pressure_step = volumetric.curvature(Projection::Exact) * mean;
+        let stresses = std::array::from_fn(|q| {
+            let (d, gradients) = (&state.points[q], &self.points[q].gradients);
+            let Some((inverse, stress)) = self.second_stress(d, volumetric.slope) else {
+                return Matrix3::repeat(f64::NAN);
+            };
+            let tangent = Tangent::new(&self.law, d, volumetric.slope, Projection::Exact);
+            let column = |i: usize| {
+                let axis = Vector3::from_fn(|k, _| if k == i { 1.0 } else { 0.0 });
+                gradients.iter().zip(&steps).map(|(g, v)| tangent.block(&axis, g) * v).sum::<Vector3<f64>>()
+            };
+            let change = Matrix3::from_columns(&[column(0), column(1), column(2)])
+                + self.law.dilatation_gradient(d) * pressure_step;
+            stress + inverse * (change - changes[q] * stress)
+        });
+        Carried { pressure: volumetric.slope + pressure_step, stresses }
+    }
+
+    /// [`Element::hessian`] with the pressure and the stresses of `carried` in place of those at `x`: `U'` is its pressure, and
+    /// `sum_q w_q g_a . (S' - S) g_b 1` is added.
+    pub(super) fn carried_hessian(&self, x: &[Vector3<f64>], carried: &Carried<Q>) -> Blocks<N> {
+        let state = self.state(x);
+        let mut blocks = [[Matrix3::zeros(); N]; N];
+        let mut mean = [Vector3::zeros(); N];
+        for ((q, d), stress) in self.points.iter().zip(&state.points).zip(&carried.stresses) {
+            let tangent = Tangent::new(&self.law, d, carried.pressure, Projection::Exact);
+            tangent.add_blocks(&q.gradients, q.weight, &mut blocks);
+            let c = self.law.dilatation_gradient(d) * q.weight;
+            mean.iter_mut().zip(&q.gradients).for_each(|(mean, g)| *mean += c * g);
+            let here = self.second_stress(d, carried.pressure);
+            let Some((_, here)) = here.filter(|_| stress.iter().all(|s| s.is_finite())) else { continue };
+            let difference = (stress - here) * q.weight;
+            for a in 0..N {
+                for b in 0..=a {
+                    let stiffness = q.gradients[a].dot(&(difference * q.gradients[b]));
+                    blocks[a][b] += Matrix3::from_diagonal_element(stiffness);
+                }
+            }
+        }
+        let curvature = self.law.volumetric(state.dilatation).curvature(Projection::Exact) / self.volume;
+        for a in 0..N {
+            for b in 0..=a {
+                blocks[a][b] += mean[a] * (mean[b] * curvature).transpose();
+            }
+        }
+        blocks
+    }
+
+    /// `F^-1`, and `S = F^-1 P` made symmetric to rounding; `None` where `F` is near to singular, and for the linear material.
+    fn second_stress(&self, d: &Deformation, pressure: f64) -> Option<(Matrix3<f64>, Matrix3<f64>)> {
+        if self.law.model == MaterialModel::Linear || d.jacobian() < LEAST_JACOBIAN {
+            return None;
+        }
+        let inverse = d.f().try_inverse()?;
+        let stress = inverse * (self.law.local_stress(d) + self.law.dilatation_gradient(d) * pressure);
+        Some((inverse, (stress + stress.transpose()) * 0.5))
+    }
+
     fn state(&self, x: &[Vector3<f64>]) -> State<Q> {
         let u = self.displacements(x);
         let points: [Deformation; Q] = std::array::from_fn(|q| deformation(&u, &self.points[q].gradients));
@@ -189,5 +260,9 @@ fn jacobian<const N: usize>(rest: &[Vector3<f64>; N], by_xi: &[[f64; 3]; N]) -> 
 
 /// `G = sum_a u_a (dN_a/dX)^T`.
 fn deformation<const N: usize>(u: &[Vector3<f64>; N], gradients: &[Vector3<f64>; N]) -> Deformation {
-    Deformation::new(u.iter().zip(gradients).fold(Matrix3::zeros(), |sum, (u, g)| sum + u * g.transpose()))
+    Deformation::new(gradient(u, gradients))
+}
+
+fn gradient<const N: usize>(u: &[Vector3<f64>; N], gradients: &[Vector3<f64>; N]) -> Matrix3<f64> {
+    u.iter().zip(gradients).fold(Matrix3::zeros(), |sum, (u, g)| sum + u * g.transpose())
 }

@@ -7,7 +7,9 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 use plica_accurate::SolveError;
 use plica_geometry::VolumeMesh;
-use plica_scene::case::{Case, Failure, LoadStep, News, Problem, Reading, Solution, follow, write_result};
+use plica_scene::case::{
+    Case, Failure, LoadStep, News, Problem, Reading, Solution, SolveOptions, Stability, StepError, follow, write_result,
+};
 use plica_scene::extents;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -44,6 +46,14 @@ struct Info {
     indefinite_steps: u32,
     failed_load_steps: u32,
     smallest_jacobian: Option<f64>,
+    /// Share of the loads that the result bears.
+    load: f64,
+    /// Shares at which the loads turned, along an arc length.
+    limit_loads: Vec<f64>,
+    /// Negative eigenvalues of the final tangent; absent where it does not tell.
+    negative_directions: Option<usize>,
+    /// Unstable equilibria that were left along their softest mode.
+    unstable_left: u32,
     load_steps: Vec<LoadStep>,
 }
 
@@ -56,7 +66,8 @@ pub fn run(args: &SolveArgs, json: bool) -> anyhow::Result<()> {
         check_writable(out)?;
     }
     let bar = bar()?;
-    let solution = follow(&problem, &case.solve(), &mut |news| show(&bar, news));
+    let options = SolveOptions { follow_stable: args.follow_stable, ..case.solve() };
+    let solution = follow(&problem, &options, &mut |news| show(&bar, news));
     bar.finish_and_clear();
     let solution = solution.map_err(|failure| advise(failure, &problem, &args.case))?;
     if let Some(out) = &args.out {
@@ -69,7 +80,7 @@ pub fn run(args: &SolveArgs, json: bool) -> anyhow::Result<()> {
         case: case.name().to_owned(),
         probes: readings.iter().map(as_json).collect::<anyhow::Result<_>>()?,
         info: Info::new(&problem, &solution),
-        warnings: warnings(&problem, &solution),
+        warnings: warnings(&problem, &solution, &options),
         wall_s: begin.elapsed().as_secs_f64(),
         out: args.out.as_ref().map(|out| out.display().to_string()),
     };
@@ -104,7 +115,10 @@ fn show(bar: &ProgressBar, news: News) -> ControlFlow<()> {
 /// What helps in this case; nothing that it has already.
 fn advise(failure: Failure, problem: &Problem, case: &Path) -> anyhow::Error {
     let advice = match &failure {
-        Failure::Stuck { error: SolveError::Singular { .. }, .. } => "hold more nodes or axes",
+        Failure::Stuck { error: StepError::Solve(SolveError::Singular { .. }), .. } => "hold more nodes or axes",
+        Failure::Stuck { error: StepError::Contact(_), .. } => {
+            "raise solve.steps, refine the mesh where the tool touches, or move the tool less far"
+        }
         Failure::Stuck { .. } if problem.is_linear() => {
             "a linear case needs one Newton step: loosen solve.tolerance, and look for elements of extreme shape or stiffness"
         }
@@ -133,6 +147,14 @@ impl Info {
             indefinite_steps: solution.indefinite_steps(),
             failed_load_steps: solution.n_failed,
             smallest_jacobian: solution.smallest_jacobian(),
+            load: solution.share,
+            limit_loads: solution.limit_loads.clone(),
+            negative_directions: match solution.stability {
+                Stability::Stable => Some(0),
+                Stability::Unstable(n) => Some(n),
+                Stability::Unknown => None,
+            },
+            unstable_left: solution.n_left,
             load_steps: solution.steps.clone(),
         }
     }
@@ -143,8 +165,15 @@ fn extents_m(mesh: &VolumeMesh) -> [f64; 3] {
     (upper - lower).into()
 }
 
-fn warnings(problem: &Problem, solution: &Solution) -> Vec<String> {
+fn warnings(problem: &Problem, solution: &Solution, options: &SolveOptions) -> Vec<String> {
     let mut warnings = problem.remarks().to_vec();
+    warnings.extend(instability(problem, solution, options));
+    if solution.share < 1.0 {
+        warnings.push(format!(
+            "the arc length ends at {:.4} of the loads: raise solve.arc_length.max_steps to go on",
+            solution.share
+        ));
+    }
     match solution.smallest_jacobian() {
         Some(j) if j < LEAST_JACOBIAN && !problem.is_linear() => {
             warnings.push(format!(
@@ -154,6 +183,34 @@ fn warnings(problem: &Problem, solution: &Solution) -> Vec<String> {
         _ => {}
     }
     warnings
+}
+
+/// What the signs of the final tangent say, unless the equilibrium is stable.
+fn instability(problem: &Problem, solution: &Solution, options: &SolveOptions) -> Option<String> {
+    let n = match solution.stability {
+        Stability::Stable => return None,
+        Stability::Unknown => {
+            return Some(
+                "the final tangent is too near to a singular one to tell whether the equilibrium is stable".into(),
+            );
+        }
+        Stability::Unstable(n) => n,
+    };
+    let directions = if n == 1 { "1 direction".to_owned() } else { format!("{n} directions") };
+    if problem.has_follower_loads() {
+        return Some(format!(
+            "the symmetric part of the final tangent is negative in {directions}: under loads that follow the surface the \
+             equilibrium may be unstable"
+        ));
+    }
+    let advice = if options.arc_length.is_some() || !problem.tools().is_empty() {
+        "a small disturbance leads elsewhere"
+    } else if options.follow_stable {
+        "--follow-stable found no way down"
+    } else {
+        "--follow-stable leaves it for a stable one"
+    };
+    Some(format!("the equilibrium is unstable: its tangent is negative in {directions}; {advice}"))
 }
 
 fn print(report: &Report, readings: &[(String, Reading)]) {
@@ -170,6 +227,13 @@ fn print(report: &Report, readings: &[(String, Reading)]) {
     );
     let residual = info.load_steps.last().and_then(|step| step.residuals.last());
     println!("residual   {:.1e} of the largest nodal force", residual.unwrap_or(&0.0));
+    if !info.limit_loads.is_empty() {
+        let shares: Vec<String> = info.limit_loads.iter().map(|share| format!("{share:.5}")).collect();
+        println!("limits     the loads turn at {} of their full size", shares.join(", "));
+    }
+    if info.unstable_left > 0 {
+        println!("unstable   {} equilibria were left along their softest mode", info.unstable_left);
+    }
     println!("elements   smallest det F {:.4}", info.smallest_jacobian.unwrap_or(1.0));
     println!("time       {:.2} s", report.wall_s);
     if let Some(out) = &report.out {

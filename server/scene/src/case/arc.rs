@@ -26,7 +26,7 @@ pub(super) fn follow(
     let (constraints, loads) = (problem.constraints_at(0.0), problem.loads_at(1.0));
     let energies = problem.energies(&loads);
     let mut solver = Solver::new(&constraints, &energies).map_err(|e| StepError::from(SolveError::from(e)))?;
-    let params = Params { tolerance: options.tolerance, max_iterations: options.max_iterations };
+    let params = Params { tolerance: options.tolerance, max_iterations: options.max_iterations, ..Params::default() };
     let body: [&dyn Energy; 1] = [problem.solid()];
     let loading = Loading { body: &body, loads_at: &|share| problem.loads_at(share), constraints: &constraints };
     let rest: Vec<_> = problem.mesh().nodes().iter().map(|node| node.coords).collect();

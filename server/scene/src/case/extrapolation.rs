@@ -1,44 +1,64 @@
 //! Start of a load step: positions extrapolated from those of the steps before.
 
+use std::ops::{AddAssign, Mul};
+
 use nalgebra::Vector3;
 
-/// Steps before the last that are kept: cubic extrapolation.
-const MAX_PAST: usize = 3;
+/// Equilibria that are kept: cubic extrapolation.
+const MAX_PAST: usize = 4;
 
-/// Equilibria before the last, the newest first.
+/// An equilibrium.
+#[derive(Debug, Clone)]
+pub(super) struct Place {
+    /// Share of the loads.
+    pub(super) share: f64,
+    /// Positions of the nodes \[m\].
+    pub(super) x: Vec<Vector3<f64>>,
+    /// Stresses of the solid, as [`plica_accurate::Energy::carried_stresses`] has them.
+    pub(super) stresses: Vec<f64>,
+}
+
+/// Equilibria up to the last, the newest first.
 #[derive(Debug, Default)]
 pub(super) struct Extrapolation {
-    past: Vec<(f64, Vec<Vector3<f64>>)>,
+    past: Vec<Place>,
 }
 
 impl Extrapolation {
-    /// Adds the equilibrium under a share of the loads.
-    pub(super) fn push(&mut self, share: f64, x: Vec<Vector3<f64>>) {
-        self.past.insert(0, (share, x));
+    /// Adds an equilibrium.
+    pub(super) fn push(&mut self, place: Place) {
+        self.past.insert(0, place);
         self.past.truncate(MAX_PAST);
     }
 
-    /// Positions at `target` by polynomials through the last equilibrium, `x` at `reached`, and those before; the highest order
-    /// first. None before the second step.
-    pub(super) fn guess(&self, reached: f64, x: &[Vector3<f64>], target: f64) -> Vec<Vec<Vector3<f64>>> {
-        let of_order = |order: usize| {
-            let shares: Vec<f64> =
-                std::iter::once(reached).chain(self.past.iter().map(|p| p.0)).take(order + 1).collect();
-            let mut sum: Vec<_> = x.iter().map(|x| x * weight(&shares, 0, target)).collect();
-            for (i, (_, past)) in self.past.iter().take(order).enumerate() {
-                let weight = weight(&shares, i + 1, target);
-                sum.iter_mut().zip(past).for_each(|(sum, x)| *sum += x * weight);
+    /// Places at `share` by polynomials through the last equilibria; the highest order first. None before the second one.
+    pub(super) fn guesses(&self, share: f64) -> impl Iterator<Item = Place> {
+        (2..=self.past.len()).rev().map(move |n| {
+            let past = &self.past[..n];
+            let weights: Vec<f64> = (0..n).map(|i| weight(past, i, share)).collect();
+            Place {
+                share,
+                x: combine(&weights, past.iter().map(|place| &place.x[..])),
+                stresses: combine(&weights, past.iter().map(|place| &place.stresses[..])),
             }
-            sum
-        };
-        (1..=self.past.len()).rev().map(of_order).collect()
+        })
     }
 }
 
-/// Lagrange's weight of the sample at `shares[i]`.
-fn weight(shares: &[f64], i: usize, target: f64) -> f64 {
-    let others = shares.iter().enumerate().filter(|(j, _)| *j != i);
-    others.map(|(_, share)| (target - share) / (shares[i] - share)).product()
+fn combine<'a, T>(weights: &[f64], values: impl Iterator<Item = &'a [T]>) -> Vec<T>
+where
+    T: Copy + AddAssign + Mul<f64, Output = T> + 'a,
+{
+    let mut parts = weights.iter().zip(values).map(|(w, v)| v.iter().map(move |v| *v * *w));
+    let mut sum: Vec<T> = parts.next().into_iter().flatten().collect();
+    parts.for_each(|part| sum.iter_mut().zip(part).for_each(|(sum, v)| *sum += v));
+    sum
+}
+
+/// Lagrange's weight of one of the places.
+fn weight(places: &[Place], i: usize, share: f64) -> f64 {
+    let others = places.iter().enumerate().filter(|(j, _)| *j != i);
+    others.map(|(_, other)| (share - other.share) / (places[i].share - other.share)).product()
 }
 
 #[cfg(test)]
@@ -47,15 +67,15 @@ mod tests {
 
     #[test]
     fn a_cubic_motion_is_extrapolated_exactly() {
-        let at = |s: f64| vec![Vector3::new(s * s * s - s, 2.0 * s * s, 1.0 + s)];
+        let at =
+            |s: f64| Place { share: s, x: vec![Vector3::new(s * s * s - s, 2.0 * s * s, 1.0 + s)], stresses: vec![s] };
         let mut past = Extrapolation::default();
-        assert!(past.guess(0.0, &at(0.0), 0.1).is_empty());
-        for share in [0.0, 0.1, 0.3] {
-            past.push(share, at(share));
-        }
-        let guesses = past.guess(0.4, &at(0.4), 0.6);
+        past.push(at(0.0));
+        assert_eq!(past.guesses(0.1).count(), 0);
+        [0.1, 0.3, 0.4].map(|share| past.push(at(share)));
+        let guesses: Vec<_> = past.guesses(0.6).collect();
         assert_eq!(guesses.len(), 3);
-        assert!((guesses[0][0] - at(0.6)[0]).norm() < 1e-12, "{guesses:?}");
-        assert!((guesses[2][0].z - 1.6).abs() < 1e-12);
+        assert!((guesses[0].x[0] - at(0.6).x[0]).norm() < 1e-12, "{guesses:?}");
+        assert!((guesses[2].x[0].z - 1.6).abs() < 1e-12 && (guesses[2].stresses[0] - 0.6).abs() < 1e-12);
     }
 }

@@ -4,13 +4,16 @@ use std::ops::ControlFlow;
 
 use nalgebra::Vector3;
 use plica_accurate::contact::{ContactError, ContactState};
-use plica_accurate::{Energy, Info, Params, SolveError, Solver};
+use plica_accurate::{Energy, Params, SolveError, Solver};
 
 use super::checked::SolveOptions;
-use super::extrapolation::Extrapolation;
+use super::extrapolation::{Extrapolation, Place};
 use super::problem::Problem;
 use super::solution::{LoadStep, Solution, Stability};
 use super::stable;
+
+/// Newton steps taken in full before a line search takes over.
+const MAX_FULL_STEPS: u32 = 25;
 
 /// Progress of a solve, reported before every Newton step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -87,25 +90,29 @@ pub fn follow(
     let least_step = largest_step * 0.5_f64.powi(options.max_halvings as i32);
     let (mut reached, mut step, mut n_failed, mut n_left) = (0.0, largest_step, 0, 0);
     let (mut steps, mut past) = (Vec::new(), Extrapolation::default());
+    past.push(state.place(problem, 0.0));
     while reached < 1.0 {
         // A remainder of rounding does not get a step of its own.
         let target = if reached + 1.01 * step >= 1.0 { 1.0 } else { reached + step };
         let mut trial = state.clone();
         if problem.touch().is_none() {
-            let guess = past.guess(reached, &state.x, target);
-            trial.x = guess.into_iter().find(|guess| is_admissible(problem, guess)).unwrap_or(trial.x);
+            let mut guesses = past.guesses(target);
+            if let Some(guess) = guesses.find(|guess| is_admissible(problem, &guess.x)) {
+                (trial.x, trial.stresses) = (guess.x, guess.stresses);
+            }
         }
         match path.attempt([reached, target], &mut trial, observer) {
             Ok(info) => {
                 steps.push(info);
-                past.push(reached, std::mem::replace(&mut state, trial).x);
-                reached = target;
+                (state, reached) = (trial, target);
+                past.push(state.place(problem, reached));
                 step = (2.0 * step).min(largest_step);
                 if options.follow_stable && problem.touch().is_none() {
                     let left = path.leave(reached, &mut state, observer)?;
                     n_left += left.len() as u32;
                     if !left.is_empty() {
                         past = Extrapolation::default();
+                        past.push(state.place(problem, reached));
                     }
                     steps.extend(left);
                 }
@@ -116,6 +123,7 @@ pub fn follow(
                 n_failed += 1;
                 step *= 0.5;
                 past = Extrapolation::default();
+                past.push(state.place(problem, reached));
             }
         }
     }
@@ -144,13 +152,20 @@ pub fn follow(
 struct State {
     x: Vec<Vector3<f64>>,
     contact: Option<ContactState>,
+    /// Stresses of the first tangent, where `x` is a guess.
+    stresses: Vec<f64>,
 }
 
 impl State {
     fn at_rest(problem: &Problem) -> Self {
         let x: Vec<_> = problem.mesh().nodes().iter().map(|node| node.coords).collect();
         let contact = problem.touch().map(|touch| touch.untouched(problem.tools(), &x));
-        Self { x, contact }
+        Self { x, contact, stresses: Vec::new() }
+    }
+
+    fn place(&self, problem: &Problem, share: f64) -> Place {
+        let stresses = problem.solid().carried_stresses(&self.x, &vec![Vector3::zeros(); self.x.len()]);
+        Place { share, x: self.x.clone(), stresses }
     }
 }
 
@@ -171,7 +186,11 @@ impl<'a> Path<'a> {
     fn new(problem: &'a Problem, options: &SolveOptions) -> Result<Self, SolveError> {
         let loads = problem.loads_at(1.0);
         let solver = Solver::new(&problem.constraints_at(1.0), &problem.energies(&loads))?;
-        let params = Params { tolerance: options.tolerance, max_iterations: options.max_iterations };
+        let params = Params {
+            tolerance: options.tolerance,
+            max_iterations: options.max_iterations,
+            max_full_steps: MAX_FULL_STEPS,
+        };
         Ok(Self { problem, params, solver })
     }
 
@@ -190,18 +209,14 @@ impl<'a> Path<'a> {
             let info = touch.follow(self.problem, target, &mut self.solver, contact, &mut state.x, watch)?;
             return Ok(LoadStep::of_contact(target, &info));
         }
-        Ok(LoadStep::new(target, self.minimise(target, &mut state.x, &mut observe)?))
-    }
-
-    fn minimise(
-        &mut self,
-        share: f64,
-        x: &mut [Vector3<f64>],
-        observer: &mut dyn FnMut(plica_accurate::Progress) -> ControlFlow<()>,
-    ) -> Result<Info, SolveError> {
-        let loads = self.problem.loads_at(share);
+        let loads = self.problem.loads_at(target);
         let energies = self.problem.energies(&loads);
-        self.solver.minimise(&energies, &self.problem.constraints_at(share), &self.params, x, observer)
+        let constraints = self.problem.constraints_at(target);
+        // The solid is the first of the energies.
+        let stresses = vec![std::mem::take(&mut state.stresses)];
+        let info =
+            self.solver.minimise_from(&energies, &constraints, &self.params, &mut state.x, stresses, &mut observe)?;
+        Ok(LoadStep::new(target, info))
     }
 
     /// Leaves unstable equilibria along their softest modes, until one is stable or no way down is found; a load step for
@@ -217,7 +232,7 @@ impl<'a> Path<'a> {
         let mut left = Vec::new();
         for _ in 0..stable::MAX_DEPARTURES {
             let Some(start) = stable::departure(&mut self.solver, &energies, &constraints, &state.x) else { break };
-            let mut trial = State { x: start, contact: None };
+            let mut trial = State { x: start, contact: None, stresses: Vec::new() };
             match self.attempt([share, share], &mut trial, observer) {
                 Ok(step) => left.push(step),
                 Err(error) if error.is_final() => return Err(error),
