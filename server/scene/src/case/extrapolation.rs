@@ -72,7 +72,7 @@ mod tests {
         let mut past = Extrapolation::default();
         past.push(at(0.0));
         assert_eq!(past.guesses(0.1).count(), 0);
-        [0.1, 0.3, 0.4].map(|share| past.push(at(share)));
+        [0.1, 0.3, 0.4].into_iter().for_each(|share| past.push(at(share)));
         let guesses: Vec<_> = past.guesses(0.6).collect();
         assert_eq!(guesses.len(), 3);
         assert!((guesses[0].x[0] - at(0.6).x[0]).norm() < 1e-12, "{guesses:?}");

@@ -136,14 +136,14 @@ pub(super) fn find(document: &Document, specs: &[SupportSpec], mesh: &NamedMesh)
                     None => rows.push((node, *direction)),
                     Some(off) if off.abs() <= same => {}
                     Some(off) => {
-                        let wanted = direction.dot(&(target - rest.coords));
+                        let wanted = without_rounding(direction.dot(&(target - rest.coords)));
                         let earlier =
                             supports.iter().find(|s| s.rows.iter().any(|(n, d)| *n == node && d.dot(direction) != 0.0));
                         let earlier = earlier.map_or("an earlier support", |s| &s.name);
                         let at: [f64; 3] = rest.coords.into();
                         let problem = format!(
                             "`{earlier}` moves the node at {at:?} m by {} m along {}, `{}` by {wanted} m",
-                            wanted - off,
+                            without_rounding(wanted - off),
                             name_of(direction),
                             spec.name
                         );
@@ -156,6 +156,11 @@ pub(super) fn find(document: &Document, specs: &[SupportSpec], mesh: &NamedMesh)
         supports.push(Support { name: spec.name.clone(), rows, motion: spec.motion });
     }
     Ok(supports)
+}
+
+/// A length for a message \[m\].
+fn without_rounding(length_m: f64) -> f64 {
+    (1e12 * length_m).round() / 1e12
 }
 
 /// Name of an axis, or the components of another direction.
