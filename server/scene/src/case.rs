@@ -19,7 +19,7 @@ mod solution;
 mod stable;
 mod support;
 mod tool;
-mod touch;
+mod tool_contact;
 
 pub use checked::{ArcLength, Case, SolveOptions};
 pub use follow::{Failure, News, StepError, follow};

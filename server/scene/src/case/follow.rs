@@ -85,7 +85,7 @@ pub fn follow(
     let mut path = Path::new(problem, options).map_err(StepError::from)?;
     let (n_unknowns, n_factor_values) = path.solver.size();
     let mut state = State::at_rest(problem);
-    let largest_step = problem.touch().map_or(1.0, |touch| touch.longest_step(problem.tools()));
+    let largest_step = problem.tool_contact().map_or(1.0, |tools| tools.longest_step(problem.tools()));
     let largest_step = largest_step.min(1.0 / f64::from(options.steps));
     let least_step = largest_step * 0.5_f64.powi(options.max_halvings as i32);
     let (mut reached, mut step, mut n_failed, mut n_left) = (0.0, largest_step, 0, 0);
@@ -95,7 +95,7 @@ pub fn follow(
         // A remainder of rounding does not get a step of its own.
         let target = if reached + 1.01 * step >= 1.0 { 1.0 } else { reached + step };
         let mut trial = state.clone();
-        if problem.touch().is_none() {
+        if problem.tool_contact().is_none() {
             let mut guesses = past.guesses(target);
             if let Some(guess) = guesses.find(|guess| is_admissible(problem, &guess.x)) {
                 (trial.x, trial.stresses) = (guess.x, guess.stresses);
@@ -107,7 +107,7 @@ pub fn follow(
                 (state, reached) = (trial, target);
                 past.push(state.place(problem, reached));
                 step = (2.0 * step).min(largest_step);
-                if options.follow_stable && problem.touch().is_none() {
+                if options.follow_stable && problem.tool_contact().is_none() {
                     let left = path.leave(reached, &mut state, observer)?;
                     n_left += left.len() as u32;
                     if !left.is_empty() {
@@ -128,8 +128,8 @@ pub fn follow(
         }
     }
     let stability = path.stability(&state);
-    let (tool_loads, contact_forces) = match (problem.touch(), &state.contact) {
-        (Some(touch), Some(contact)) => touch.loads(problem.tools(), contact, &state.x),
+    let (tool_loads, contact_forces) = match (problem.tool_contact(), &state.contact) {
+        (Some(tools), Some(contact)) => tools.loads(problem.tools(), contact, &state.x),
         _ => Default::default(),
     };
     Ok(Solution {
@@ -159,7 +159,7 @@ struct State {
 impl State {
     fn at_rest(problem: &Problem) -> Self {
         let x: Vec<_> = problem.mesh().nodes().iter().map(|node| node.coords).collect();
-        let contact = problem.touch().map(|touch| touch.untouched(problem.tools(), &x));
+        let contact = problem.tool_contact().map(|tools| tools.untouched(problem.tools(), &x));
         Self { x, contact, stresses: Vec::new() }
     }
 
@@ -204,9 +204,9 @@ impl<'a> Path<'a> {
         let mut observe = |progress: plica_accurate::Progress| {
             observer(News { reached, target, iteration: progress.iteration, residual: progress.residual })
         };
-        if let (Some(touch), Some(contact)) = (self.problem.touch(), &mut state.contact) {
+        if let (Some(tools), Some(contact)) = (self.problem.tool_contact(), &mut state.contact) {
             let watch = &mut |progress: plica_accurate::contact::ContactProgress| observe(progress.newton);
-            let info = touch.follow(self.problem, target, &mut self.solver, contact, &mut state.x, watch)?;
+            let info = tools.follow(self.problem, target, &mut self.solver, contact, &mut state.x, watch)?;
             return Ok(LoadStep::of_contact(target, &info));
         }
         let loads = self.problem.loads_at(target);
@@ -245,9 +245,9 @@ impl<'a> Path<'a> {
 
     fn stability(&mut self, state: &State) -> Stability {
         let (problem, constraints) = (self.problem, self.problem.constraints_at(1.0));
-        let n_negative = match (problem.touch(), &state.contact) {
-            (Some(touch), Some(contact)) => {
-                touch.n_negative(problem, &mut self.solver, contact, &state.x, &constraints)
+        let n_negative = match (problem.tool_contact(), &state.contact) {
+            (Some(tools), Some(contact)) => {
+                tools.n_negative(problem, &mut self.solver, contact, &state.x, &constraints)
             }
             _ => {
                 let loads = problem.loads_at(1.0);

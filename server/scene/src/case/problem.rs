@@ -11,7 +11,7 @@ use super::material::MaterialSpec;
 use super::probe::Probe;
 use super::support::{self, Support};
 use super::tool::Tool;
-use super::touch::Touch;
+use super::tool_contact::ToolContact;
 use super::{held, select};
 use crate::document::Document;
 use crate::error::ConfigError;
@@ -30,7 +30,7 @@ pub struct Problem {
     supports: Vec<Support>,
     loads: Vec<Load>,
     tools: Vec<Tool>,
-    touch: Option<Touch>,
+    tool_contact: Option<ToolContact>,
     probes: Vec<Probe>,
 }
 
@@ -78,12 +78,12 @@ impl Problem {
             supports,
             loads,
             tools,
-            touch: None,
+            tool_contact: None,
             probes,
         };
         if !problem.tools.is_empty() {
             let softest = case.materials().map(|m| m.young_modulus_pa).fold(f64::INFINITY, f64::min);
-            problem.touch = Some(touch(document, &problem, softest)?);
+            problem.tool_contact = Some(contact_with_tools(document, &problem, softest)?);
         }
         Ok(problem)
     }
@@ -139,8 +139,8 @@ impl Problem {
     }
 
     /// Contact with the tools, where there are any.
-    pub(super) fn touch(&self) -> Option<&Touch> {
-        self.touch.as_ref()
+    pub(super) fn tool_contact(&self) -> Option<&ToolContact> {
+        self.tool_contact.as_ref()
     }
 
     /// Whether loads follow the surface, so that equilibria have no energy.
@@ -198,12 +198,12 @@ impl Problem {
 }
 
 /// Contact with tools, which knows hexahedra only.
-fn touch(document: &Document, problem: &Problem, softest_pa: f64) -> Result<Touch, ConfigError> {
+fn contact_with_tools(document: &Document, problem: &Problem, softest_pa: f64) -> Result<ToolContact, ConfigError> {
     let Some(hexes) = problem.mesh().hexahedra() else {
         let problem = format!("touch a mesh of {}", problem.mesh().kind().plural());
         return Err(document.error("tools", problem, "mesh the body with hexahedra, or press it by a displacement"));
     };
-    Ok(Touch::new(problem, hexes, softest_pa))
+    Ok(ToolContact::new(problem, hexes, softest_pa))
 }
 
 /// A sentence about elements that are stiffer than the body.

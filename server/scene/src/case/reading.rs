@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::probe::{Probe, Sensor, Source};
 use super::problem::Problem;
 use super::solution::Solution;
-use super::touch::ToolLoad;
+use super::tool_contact::ToolLoad;
 
 /// Reading of a probe.
 #[derive(Debug, Clone, PartialEq, Serialize)]

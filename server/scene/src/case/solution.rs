@@ -5,7 +5,7 @@ use plica_accurate::Info;
 use plica_accurate::contact::ContactInfo;
 use serde::Serialize;
 
-use super::touch::ToolLoad;
+use super::tool_contact::ToolLoad;
 
 /// A converged load step.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -22,7 +22,7 @@ const MAX_UPDATES: u32 = 60;
 
 /// Surface and parameters of contact.
 #[derive(Debug)]
-pub(super) struct Touch {
+pub(super) struct ToolContact {
     surface: ContactSurface,
     params: ContactParams,
 }
@@ -42,7 +42,7 @@ struct Placed {
     pose: Isometry3<f64>,
 }
 
-impl Touch {
+impl ToolContact {
     /// Contact points on the boundary of the problem's `mesh`; `young_modulus_pa` is that of the softest material \[Pa\].
     pub(super) fn new(problem: &Problem, mesh: &HexMesh, young_modulus_pa: f64) -> Self {
         let params = ContactParams {
