@@ -2,9 +2,8 @@
 //!
 //! Modulus, exponent and the depth at which the ball had touched already are fitted on every other press of a region; the error
 //! is that of the force on the presses in between. Forces of the laws are solutions of the accurate model: a rigid ball on a block
-//! ten radii wide and deep, nearly incompressible, without friction.
-//!
-//! `cargo test --release -p plica-accurate --test pig_liver -- --ignored --nocapture`
+//! ten radii wide and deep, nearly incompressible, without friction. They are stored in `pig_liver.json`, which
+//! `cargo test --release -p plica-accurate --test pig_liver -- --ignored` writes anew.
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 mod contact;
@@ -15,6 +14,7 @@ use std::path::{Path, PathBuf};
 use contact::YOUNG_MODULUS_PA;
 use contact::quarter::{Quarter, graded};
 use plica_accurate::{Material, MaterialModel};
+use serde_json::{Value, json};
 
 const RADIUS_M: f64 = 4e-3;
 const POISSON_RATIO: f64 = 0.495;
@@ -42,28 +42,34 @@ struct Fit {
     misfit: f64,
 }
 
+const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/pig_liver.json");
+
+/// Forces `F/(E R^2)` at some depths over the ball's radius.
+fn forces(exponent: f64, depths: &[f64]) -> Vec<f64> {
+    let (n_fine, n_growing) = (8, 7);
+    let coordinates = graded(1.1 * RADIUS_M / n_fine as f64, n_fine, n_growing, 10.0 * RADIUS_M);
+    let depths_m: Vec<f64> = depths.iter().map(|depth| depth * RADIUS_M).collect();
+    let model = match exponent {
+        0.0 => MaterialModel::CompressibleNeoHookean,
+        exponent => MaterialModel::Exponential { exponent },
+    };
+    let material = Material { model, young_modulus_pa: YOUNG_MODULUS_PA, poisson_ratio: POISSON_RATIO };
+    let forces = Quarter::new(&coordinates, &coordinates, material).press(RADIUS_M, &depths_m);
+    forces.iter().map(|(force_n, _)| force_n / (YOUNG_MODULUS_PA * RADIUS_M * RADIUS_M)).collect()
+}
+
 /// `ln(F/(E R^2))` by exponent and depth.
 struct Table {
     rows: Vec<Vec<f64>>,
 }
 
 impl Table {
-    fn solve(n_fine: usize, n_growing: usize) -> Self {
-        let coordinates = graded(1.1 * RADIUS_M / n_fine as f64, n_fine, n_growing, 10.0 * RADIUS_M);
-        let depths_m = DEPTHS.map(|depth| depth * RADIUS_M);
-        let row = |exponent: f64| {
-            let model = match exponent {
-                0.0 => MaterialModel::CompressibleNeoHookean,
-                exponent => MaterialModel::Exponential { exponent },
-            };
-            let material = Material { model, young_modulus_pa: YOUNG_MODULUS_PA, poisson_ratio: POISSON_RATIO };
-            let forces = Quarter::new(&coordinates, &coordinates, material).press(RADIUS_M, &depths_m);
-            let row: Vec<f64> =
-                forces.iter().map(|(force_n, _)| (force_n / (YOUNG_MODULUS_PA * RADIUS_M * RADIUS_M)).ln()).collect();
-            println!("exponent {exponent}: F/(E R^2) {:.4?}", row.iter().map(|log| log.exp()).collect::<Vec<_>>());
-            row
-        };
-        Self { rows: EXPONENTS.map(row).to_vec() }
+    fn stored() -> Self {
+        let file: Value = serde_json::from_str(&std::fs::read_to_string(FILE).unwrap()).unwrap();
+        let numbers = |list: &Value| list.as_array().unwrap().iter().map(|n| n.as_f64().unwrap()).collect::<Vec<_>>();
+        assert_eq!((numbers(&file["exponents"]), numbers(&file["depths"])), (EXPONENTS.to_vec(), DEPTHS.to_vec()));
+        let rows = file["forces"].as_array().unwrap().iter();
+        Self { rows: rows.map(|row| numbers(row).iter().map(|force| force.ln()).collect()).collect() }
     }
 
     /// Interpolated linearly in the number of the exponent and in the logarithm of the depth.
@@ -143,10 +149,9 @@ fn measured() -> Option<BTreeMap<String, Vec<Press>>> {
 }
 
 #[test]
-#[ignore = "minutes: presses a ball into six materials"]
 fn an_exponential_law_foretells_the_force_on_liver_better_than_a_neo_hookean_one() {
     let Some(regions) = measured() else { return };
-    let table = Table::solve(8, 7);
+    let table = Table::stored();
     for (region, presses) in &regions {
         let half = |odd: usize| presses.iter().skip(odd).step_by(2).cloned().collect::<Vec<_>>();
         let (fitted, others) = (half(0), half(1));
@@ -171,4 +176,22 @@ fn an_exponential_law_foretells_the_force_on_liver_better_than_a_neo_hookean_one
         assert!(medians[1][0] < medians[0][0], "{region}: {medians:?}");
         assert!(medians[1][1] < medians[0][1], "{region}: {medians:?}");
     }
+}
+
+/// Small depths of one exponent, solved again.
+#[test]
+fn stored_forces_are_those_of_the_solver() {
+    let stored = Table::stored();
+    let n = 4;
+    for (force, log) in forces(EXPONENTS[3], &DEPTHS[..n]).iter().zip(&stored.rows[3]) {
+        assert!((force / log.exp() - 1.0).abs() < 1e-3, "{force} is not {}", log.exp());
+    }
+}
+
+#[test]
+#[ignore = "minutes: presses a ball into six materials, writes pig_liver.json"]
+fn write_stored_forces() {
+    let rows: Vec<Vec<f64>> = EXPONENTS.iter().map(|exponent| forces(*exponent, &DEPTHS)).collect();
+    let file = json!({"exponents": EXPONENTS, "depths": DEPTHS, "poisson_ratio": POISSON_RATIO, "forces": rows});
+    std::fs::write(FILE, format!("{file:#}\n")).unwrap();
 }
