@@ -30,6 +30,9 @@ pub(super) struct Content {
     pub(super) cell_vectors: Vec<CellVectors>,
 }
 
+/// Volumes that are read.
+pub(super) const READ: &str = "8-node hexahedra, 4-node and 10-node tetrahedra";
+
 /// Most nodes of a cell.
 pub(super) const MAX_NODES: usize = 10;
 
@@ -158,8 +161,8 @@ impl Content {
         if let Some(other) = volumes.find(|cell| cell.shape != first.shape) {
             let n = |shape: Shape| self.cells.iter().filter(|cell| cell.shape == shape).count();
             let [one, two] = [first.shape, other.shape].map(|shape| format!("{} {}", n(shape), shape.plural()));
-            let advice = "mesh the whole body with one of 8-node hexahedra, 4-node and 10-node tetrahedra: without the others \
-                          the body would have holes";
+            let advice =
+                format!("mesh the whole body with one of {READ}: without the others the body would have holes");
             let place = Place::Field(format!("cell {}", other.number), None);
             return fault(place, format!("holds {two} beside {one}; one kind is read"), advice);
         }

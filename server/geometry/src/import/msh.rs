@@ -9,9 +9,9 @@ use std::collections::HashMap;
 
 use nalgebra::Point3;
 
-use super::assemble::{Cell, Content, Labels, MAX_NODES, Shape};
+use super::assemble::{Cell, Content, Labels, MAX_NODES, READ, Shape};
 use super::error::{DAMAGED, Fault, Place, fault};
-use elements::{Element, Kind, READ};
+use elements::{Element, Kind};
 use reader::Reader;
 
 /// Content of the file read so far.

@@ -12,9 +12,6 @@ pub(super) struct Element {
     pub(super) kind: Kind,
 }
 
-/// Volumes that are read.
-pub(super) const READ: &str = "8-node hexahedra, 4-node and 10-node tetrahedra";
-
 /// Place of Gmsh's node `k` in the order of VTK, which names the middles of the edges 1-3 and 2-3 of a tetrahedron the other way
 /// round.
 pub(super) fn place(shape: Shape, k: usize) -> usize {

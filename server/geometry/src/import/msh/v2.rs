@@ -3,8 +3,9 @@
 use nalgebra::Point3;
 
 use super::MshContent;
-use super::elements::{Element, READ};
+use super::elements::Element;
 use super::reader::Reader;
+use crate::import::assemble::READ;
 use crate::import::error::{DAMAGED, Fault, fault};
 
 /// `$Nodes`: a count as text, then tag and position of every node.

@@ -4,7 +4,7 @@ use roxmltree::Node;
 
 use super::arrays::{Array, Source, place};
 use super::child;
-use crate::import::assemble::{Cell, MAX_NODES, Shape};
+use crate::import::assemble::{Cell, MAX_NODES, READ, Shape};
 use crate::import::error::{DAMAGED, Fault, fault};
 
 /// Import of a VTK cell type.
@@ -108,10 +108,7 @@ fn refuse_unfit(node: Node<'_, '_>, types: &[u64], ranges: &[&[u64]]) -> Result<
         }
         _ => ("cells", DAMAGED),
     };
-    let problem = format!(
-        "holds {n_same} {name}{beside} (cell {i}, type {code}); 8-node hexahedra, 4-node and 10-node \
-         tetrahedra are read"
-    );
+    let problem = format!("holds {n_same} {name}{beside} (cell {i}, type {code}); {READ} are read");
     fault(place(node, "types"), problem, advice)
 }
 
