@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 const RADIUS_M: f64 = 4e-3;
 const POISSON_RATIO: f64 = 0.495;
 /// Depths over the ball's radius at which forces are solved.
-const DEPTHS: [f64; 14] = [0.01, 0.02, 0.04, 0.07, 0.11, 0.16, 0.22, 0.29, 0.37, 0.46, 0.55, 0.64, 0.73, 0.82];
+const DEPTHS: [f64; 12] = [0.04, 0.07, 0.11, 0.16, 0.22, 0.29, 0.37, 0.46, 0.55, 0.64, 0.73, 0.82];
 /// Exponents; 0 is the Neo-Hookean law.
 const EXPONENTS: [f64; 6] = [0.0, 3.0, 12.0, 36.0, 90.0, 200.0];
 /// Forces below it are noise of the sensor \[N\].
@@ -178,20 +178,22 @@ fn an_exponential_law_foretells_the_force_on_liver_better_than_a_neo_hookean_one
     }
 }
 
-/// Small depths of one exponent, solved again.
+/// Small depths of one exponent, solved again; four decimals are stored.
 #[test]
 fn stored_forces_are_those_of_the_solver() {
     let stored = Table::stored();
-    let n = 4;
+    let n = 3;
     for (force, log) in forces(EXPONENTS[3], &DEPTHS[..n]).iter().zip(&stored.rows[3]) {
-        assert!((force / log.exp() - 1.0).abs() < 1e-3, "{force} is not {}", log.exp());
+        assert!((force / log.exp() - 1.0).abs() < 5e-3, "{force} is not {}", log.exp());
     }
 }
 
 #[test]
 #[ignore = "minutes: presses a ball into six materials, writes pig_liver.json"]
 fn write_stored_forces() {
-    let rows: Vec<Vec<f64>> = EXPONENTS.iter().map(|exponent| forces(*exponent, &DEPTHS)).collect();
+    let rounded = |force: f64| (force * 1e4).round() / 1e4;
+    let row = |exponent: &f64| forces(*exponent, &DEPTHS).into_iter().map(rounded).collect();
+    let rows: Vec<Vec<f64>> = EXPONENTS.iter().map(row).collect();
     let file = json!({"exponents": EXPONENTS, "depths": DEPTHS, "poisson_ratio": POISSON_RATIO, "forces": rows});
     std::fs::write(FILE, format!("{file:#}\n")).unwrap();
 }
