@@ -354,3 +354,27 @@ fn the_block_is_converged() {
     assert_close(block("compressible_neo_hookean", 20), 0.70e-3, 0.03);
     assert_close(block("stable_neo_hookean", 12), block("stable_neo_hookean", 20), 0.01);
 }
+
+#[test]
+fn an_unstable_equilibrium_is_a_warning_and_may_be_left() {
+    let file = repository().join("configs/cases/column.toml");
+    let file = file.to_str().unwrap();
+    let straight = last_line(&plicad(&["solve", file, "--json"]));
+    assert!(
+        straight["warnings"][0].as_str().unwrap().contains("negative in 1 direction; --follow-stable"),
+        "{straight}"
+    );
+    assert_eq!(straight["info"]["negative_directions"], 1);
+    let bent = last_line(&plicad(&["solve", file, "--follow-stable", "--json"]));
+    assert_eq!(
+        (&bent["info"]["negative_directions"], bent["warnings"].as_array().unwrap().len()),
+        (&Value::from(0), 0)
+    );
+    assert!(probe(&bent, "tip")[2].abs() > 0.07, "{bent}");
+}
+
+#[test]
+fn both_schemas_are_printed() {
+    assert_eq!(last_line(&plicad(&["schema", "--case", "--json"]))["title"], "Plica case");
+    assert_ne!(last_line(&plicad(&["schema", "--json"]))["title"], "Plica case");
+}
