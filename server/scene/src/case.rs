@@ -3,12 +3,14 @@
 mod arc;
 mod checked;
 mod extrapolation;
+mod failure;
 mod fibres;
 mod follow;
 mod held;
 mod load;
 mod material;
 mod mesh;
+mod news;
 mod output;
 mod probe;
 mod problem;
@@ -22,9 +24,11 @@ mod tool;
 mod tool_contact;
 
 pub use checked::{ArcLength, Case, SolveOptions};
-pub use follow::{Failure, News, StepError, follow};
+pub use failure::{Failure, StepError};
+pub use follow::follow;
 pub use load::Load;
 pub use mesh::MeshSource;
+pub use news::News;
 pub use output::write_result;
 pub use probe::Probe;
 pub use problem::Problem;

@@ -6,7 +6,8 @@ use nalgebra::Vector3;
 use plica_accurate::{ArcState, Energy, Loading, Params, Progress, SolveError, Solver};
 
 use super::checked::{ArcLength, SolveOptions};
-use super::follow::{Failure, News, StepError};
+use super::failure::{Failure, StepError};
+use super::news::News;
 use super::problem::Problem;
 use super::solution::{LoadStep, Solution, Stability};
 

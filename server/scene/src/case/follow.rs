@@ -3,72 +3,21 @@
 use std::ops::ControlFlow;
 
 use nalgebra::Vector3;
-use plica_accurate::contact::{ContactError, ContactState};
+use plica_accurate::contact::{ContactProgress, ContactState};
 use plica_accurate::{Energy, Params, SolveError, Solver};
 
+use super::arc;
 use super::checked::SolveOptions;
 use super::extrapolation::{Extrapolation, Place};
+use super::failure::{Failure, StepError};
+use super::news::News;
 use super::problem::Problem;
 use super::solution::{LoadStep, Solution, Stability};
 use super::stable;
+use super::tool_contact::LoadedBody;
 
 /// Newton steps taken in full before a line search takes over.
 const MAX_FULL_STEPS: u32 = 25;
-
-/// Progress of a solve, reported before every Newton step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct News {
-    /// Share of the loads already carried.
-    pub reached: f64,
-    /// Share of the loads at the end of this load step.
-    pub target: f64,
-    /// Newton steps done in this load step.
-    pub iteration: u32,
-    /// Largest force left, as a share of the largest nodal force.
-    pub residual: f64,
-}
-
-/// Why a load step has no equilibrium.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum StepError {
-    /// Newton's method failed.
-    #[error(transparent)]
-    Solve(#[from] SolveError),
-    /// Contact with the tools failed.
-    #[error("contact with the tools: {0}")]
-    Contact(#[from] ContactError),
-}
-
-/// Why the loads cannot be applied completely.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Failure {
-    /// The smallest load step failed.
-    #[error("no equilibrium beyond {reached:.4} of the loads: {error}, on the way to {target:.4}")]
-    Stuck {
-        /// Share of the loads with an equilibrium.
-        reached: f64,
-        /// Share of the failed step.
-        target: f64,
-        /// Error of the last attempt.
-        error: StepError,
-    },
-    /// Ended by the observer, or out of memory.
-    #[error(transparent)]
-    Solve(#[from] StepError),
-}
-
-impl StepError {
-    /// Whether smaller steps cannot help.
-    pub(super) fn is_final(&self) -> bool {
-        matches!(
-            self,
-            Self::Solve(SolveError::Cancelled { .. } | SolveError::Factor(_))
-                | Self::Contact(
-                    ContactError::Cancelled { .. } | ContactError::Solve { source: SolveError::Factor(_), .. }
-                )
-        )
-    }
-}
 
 /// Applies the loads of `problem` from rest on. `observer` is called before every Newton step and may cancel.
 ///
@@ -80,7 +29,7 @@ pub fn follow(
     observer: &mut dyn FnMut(News) -> ControlFlow<()>,
 ) -> Result<Solution, Failure> {
     if let Some(arc) = options.arc_length {
-        return super::arc::follow(problem, options, &arc, observer);
+        return arc::follow(problem, options, &arc, observer);
     }
     let mut path = Path::new(problem, options).map_err(StepError::from)?;
     let (n_unknowns, n_factor_values) = path.solver.size();
@@ -204,14 +153,16 @@ impl<'a> Path<'a> {
         let mut observe = |progress: plica_accurate::Progress| {
             observer(News { reached, target, iteration: progress.iteration, residual: progress.residual })
         };
-        if let (Some(tools), Some(contact)) = (self.problem.tool_contact(), &mut state.contact) {
-            let watch = &mut |progress: plica_accurate::contact::ContactProgress| observe(progress.newton);
-            let info = tools.follow(self.problem, target, &mut self.solver, contact, &mut state.x, watch)?;
-            return Ok(LoadStep::of_contact(target, &info));
-        }
         let loads = self.problem.loads_at(target);
         let energies = self.problem.energies(&loads);
         let constraints = self.problem.constraints_at(target);
+        if let (Some(tools), Some(contact)) = (self.problem.tool_contact(), &mut state.contact) {
+            let watch = &mut |progress: ContactProgress| observe(progress.newton);
+            let tools_of = self.problem.tools();
+            let body = LoadedBody { share: target, energies: &energies, constraints: &constraints, tools: tools_of };
+            let info = tools.follow(&body, &mut self.solver, contact, &mut state.x, watch)?;
+            return Ok(LoadStep::of_contact(target, &info));
+        }
         // The solid is the first of the energies.
         let stresses = vec![std::mem::take(&mut state.stresses)];
         let info =
@@ -245,14 +196,15 @@ impl<'a> Path<'a> {
 
     fn stability(&mut self, state: &State) -> Stability {
         let (problem, constraints) = (self.problem, self.problem.constraints_at(1.0));
+        let loads = problem.loads_at(1.0);
+        let energies = problem.energies(&loads);
         let n_negative = match (problem.tool_contact(), &state.contact) {
             (Some(tools), Some(contact)) => {
-                tools.n_negative(problem, &mut self.solver, contact, &state.x, &constraints)
+                let tools_of = problem.tools();
+                let body = LoadedBody { share: 1.0, energies: &energies, constraints: &constraints, tools: tools_of };
+                tools.n_negative(&body, &mut self.solver, contact, &state.x)
             }
-            _ => {
-                let loads = problem.loads_at(1.0);
-                self.solver.n_negative(&problem.energies(&loads), &constraints, &state.x)
-            }
+            _ => self.solver.n_negative(&energies, &constraints, &state.x),
         };
         Stability::new(n_negative)
     }

@@ -203,7 +203,7 @@ fn contact_with_tools(document: &Document, problem: &Problem, softest_pa: f64) -
         let problem = format!("touch a mesh of {}", problem.mesh().kind().plural());
         return Err(document.error("tools", problem, "mesh the body with hexahedra, or press it by a displacement"));
     };
-    Ok(ToolContact::new(problem, hexes, softest_pa))
+    Ok(ToolContact::new(hexes, &problem.constraints_at(1.0), softest_pa))
 }
 
 /// A sentence about elements that are stiffer than the body.

@@ -10,7 +10,6 @@ use plica_accurate::contact::{
 use plica_accurate::{Constraints, Energy, Solver};
 use plica_geometry::HexMesh;
 
-use super::problem::Problem;
 use super::tool::Tool;
 
 /// Longest motion of a tool in an increment, as a share of the mean edge of the mesh.
@@ -36,6 +35,15 @@ pub(super) struct ToolLoad {
     pub(super) moment: Vector3<f64>,
 }
 
+/// Body under a share of its loads.
+#[derive(Clone, Copy)]
+pub(super) struct LoadedBody<'a> {
+    pub(super) share: f64,
+    pub(super) energies: &'a [&'a dyn Energy],
+    pub(super) constraints: &'a Constraints,
+    pub(super) tools: &'a [Tool],
+}
+
 /// Obstacle and pose under a share of the loads: a single tool's own, or the union of several in the frame of the world.
 struct Placed {
     obstacle: Obstacle,
@@ -43,15 +51,15 @@ struct Placed {
 }
 
 impl ToolContact {
-    /// Contact points on the boundary of the problem's `mesh`; `young_modulus_pa` is that of the softest material \[Pa\].
-    pub(super) fn new(problem: &Problem, mesh: &HexMesh, young_modulus_pa: f64) -> Self {
+    /// Contact points on the boundary of `mesh` where `constraints` leave it free; `young_modulus_pa` is that of the softest material \[Pa\].
+    pub(super) fn new(mesh: &HexMesh, constraints: &Constraints, young_modulus_pa: f64) -> Self {
         let params = ContactParams {
             pressure_tolerance: PRESSURE_TOLERANCE,
             newton_tolerance: NEWTON_TOLERANCE,
             max_updates: MAX_UPDATES,
             ..ContactParams::new(young_modulus_pa, INCREMENT_CELLS * mesh.mean_longest_edge())
         };
-        Self { surface: ContactSurface::of_boundary(mesh, &problem.constraints_at(1.0)), params }
+        Self { surface: ContactSurface::of_boundary(mesh, constraints), params }
     }
 
     /// Longest share of the loads in which no tool moves further than an increment.
@@ -68,21 +76,19 @@ impl ToolContact {
     /// Moves `x` to equilibrium with the tools where they are under a share of the loads.
     pub(super) fn follow(
         &self,
-        problem: &Problem,
-        share: f64,
+        body: &LoadedBody<'_>,
         solver: &mut Solver,
         state: &mut ContactState,
         x: &mut [Vector3<f64>],
         observer: &mut dyn FnMut(ContactProgress) -> ControlFlow<()>,
     ) -> Result<ContactInfo, ContactError> {
-        let Placed { obstacle, pose } = place(problem.tools(), share);
-        let loads = problem.loads_at(share);
+        let Placed { obstacle, pose } = place(body.tools, body.share);
         let press = Press {
-            energies: &problem.energies(&loads),
-            constraints: &problem.constraints_at(share),
+            energies: body.energies,
+            constraints: body.constraints,
             surface: &self.surface,
             obstacle: &obstacle,
-            friction: problem.tools().iter().map(|tool| tool.friction).fold(0.0, f64::max),
+            friction: body.tools.iter().map(|tool| tool.friction).fold(0.0, f64::max),
             params: self.params,
         };
         press.follow(&[pose], solver, state, x, observer)
@@ -91,13 +97,12 @@ impl ToolContact {
     /// Number of negative directions with the contact as it is, without the stiffness of friction.
     pub(super) fn n_negative(
         &self,
-        problem: &Problem,
+        body: &LoadedBody<'_>,
         solver: &mut Solver,
         state: &ContactState,
         x: &[Vector3<f64>],
-        constraints: &Constraints,
     ) -> Option<usize> {
-        let Placed { obstacle, pose } = place(problem.tools(), 1.0);
+        let Placed { obstacle, pose } = place(body.tools, body.share);
         let ContactParams { young_modulus_pa, penalty_ratio, .. } = self.params;
         let sizes = self.surface.points().iter().map(|point| point.size_m);
         let penalties: Vec<f64> = sizes.map(|size| penalty_ratio * young_modulus_pa / size).collect();
@@ -108,10 +113,9 @@ impl ToolContact {
             multipliers_pa: state.pressures_pa(),
             penalties_pa_per_m: &penalties,
         };
-        let loads = problem.loads_at(1.0);
-        let mut energies = problem.energies(&loads);
+        let mut energies = body.energies.to_vec();
         energies.push(&contact as &dyn Energy);
-        solver.n_negative(&energies, constraints, x)
+        solver.n_negative(&energies, body.constraints, x)
     }
 
     /// Forces of each tool on the body, and of all tools on each node, `[n_nodes]` \[N\].
