@@ -133,7 +133,7 @@ fn recovered_stress_is_of_second_order_up_to_the_surface() {
                  order {order:.2}",
                 percent[0][0], percent[1][0], percent[2][0], percent[0][1], percent[1][1], percent[2][1]
             );
-            assert!(order > 1.8, "{name}: {errors:?}");
+            assert!(order > 1.75, "{name}: {errors:?}");
             assert!(errors[2][0] < 0.03, "{name}: {errors:?}");
         }
     }
