@@ -29,5 +29,5 @@ pub use loads::{NodalForces, Pressure, Traction};
 pub use material::{Lame, Material, MaterialError, MaterialModel};
 pub use newton::{Info, Params, Progress, SolveError, Solver};
 pub use reaction::reactions;
-pub use solid::{GAUSS_POINTS, Solid, SolidError};
+pub use solid::{GAUSS_POINTS, Solid, SolidError, TurnGuard};
 pub use tie::{TIE_VERSION, Tie, TieOptions, TieTarget};

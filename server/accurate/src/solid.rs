@@ -1,6 +1,7 @@
 //! The elastic energy of a hexahedral mesh.
 
 mod element;
+mod guard;
 
 use nalgebra::{Matrix3, Vector3};
 use plica_geometry::{HexIdx, HexMesh, NodeIdx, isoparametric};
@@ -9,6 +10,7 @@ use crate::energy::{Energy, Projection};
 use crate::hessian::Hessian;
 use crate::material::{Law, Material, MaterialError};
 use element::Element;
+pub use guard::TurnGuard;
 
 /// Reference coordinates of the 2 x 2 x 2 Gauss points, in the order of the corners.
 pub const GAUSS_POINTS: [[f64; 3]; 8] = {
@@ -96,6 +98,12 @@ impl Solid {
     /// pressure of the element's mean dilatation: `P F^T / J`; of the linear material `2 mu eps + lambda tr(eps) I`.
     pub fn cauchy_stress(&self, x: &[Vector3<f64>], hex: HexIdx, xi: [f64; 3]) -> Matrix3<f64> {
         self.elements[hex.index()].cauchy_stress(x, xi)
+    }
+
+    /// The hexahedron with the smallest `det F` at a Gauss point.
+    pub fn most_compressed(&self, x: &[Vector3<f64>]) -> Option<HexIdx> {
+        let smallest = self.elements.iter().map(|e| e.smallest_jacobian(x)).enumerate();
+        smallest.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(hex, _)| HexIdx::from_index(hex))
     }
 
     /// Volume \[m^3\] of the deformed solid.

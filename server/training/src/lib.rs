@@ -32,8 +32,9 @@ mod suction;
 mod tandem;
 mod tie_targets;
 mod tool_path;
+mod worth;
 
-pub use accurate::{Accurate, AccurateFailure, AccurateResult, AccurateSize, SolveInfo};
+pub use accurate::{Accurate, AccurateFailure, AccurateResult, AccurateSize, SMALLEST_JACOBIAN, SolveInfo};
 pub use atomic_file::{sync_folder, write_atomically, write_json_atomically};
 pub use canonical::{fingerprint, hexadecimal, to_text};
 pub use coarse::{Coarse, CoarseResult, Interrupted, Settling, SolveObserver};
@@ -58,5 +59,6 @@ pub use setup::{
     AccurateDescription, Approach, DriveOptions, FeatureScales, IN_REGION, InteractionSet, PressRanges, RecordedPose,
     Setup, Source,
 };
-pub use tandem::{CoarseHalf, Load, SMALLEST_JACOBIAN, Stop, Tandem};
+pub use tandem::{CoarseHalf, Load, Stop, Tandem};
 pub use tool_path::ToolPath;
+pub use worth::{SkinDistance, Unguarded, Worth};

@@ -51,6 +51,7 @@ fn database(two_references: bool) -> Database {
             contact_point_m: [0.0; 3],
             depth_m: 0.01,
             drag_m: [0.0; 3],
+            worth: None,
             interaction_sha256: "c".repeat(64),
         }],
     }

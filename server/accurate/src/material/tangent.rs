@@ -41,11 +41,31 @@ impl Tangent {
             transposition: 0.0,
             negative: NegativeModes::default(),
         };
-        if projection == Projection::PositiveSemidefinite {
-            let factors = [tangent.identity, tangent.along_f, tangent.along_cofactor, tangent.curvature];
-            tangent.negative = NegativeModes::new(&tangent.f, factors);
-        }
+        tangent.project(projection);
         tangent
+    }
+
+    /// Of an energy density `w(J)`, given `w'` and `w''`.
+    pub(crate) fn of_volume(deformation: &Deformation, slope: f64, curvature: f64, projection: Projection) -> Self {
+        let mut tangent = Self {
+            f: deformation.f(),
+            cofactor: deformation.cofactor(),
+            identity: 0.0,
+            along_f: 0.0,
+            along_cofactor: curvature,
+            curvature: slope,
+            transposition: 0.0,
+            negative: NegativeModes::default(),
+        };
+        tangent.project(projection);
+        tangent
+    }
+
+    fn project(&mut self, projection: Projection) {
+        if projection == Projection::PositiveSemidefinite {
+            let factors = [self.identity, self.along_f, self.along_cofactor, self.curvature];
+            self.negative = NegativeModes::new(&self.f, factors);
+        }
     }
 
     /// `2 mu sym`: positive semi-definite, and the trace is linear in `F`.

@@ -9,9 +9,9 @@ use crate::material::{Deformation, Law, MaterialModel, Tangent};
 
 /// Gradients `dN_a/dX` \[1/m\] and weight `det(dX/dxi)` \[m^3\] of a Gauss point.
 #[derive(Debug, Clone)]
-struct GaussPoint {
-    gradients: [Vector3<f64>; 8],
-    weight: f64,
+pub(super) struct GaussPoint {
+    pub(super) gradients: [Vector3<f64>; 8],
+    pub(super) weight: f64,
 }
 
 #[derive(Debug, Clone)]
@@ -42,6 +42,16 @@ impl Element {
 
     pub(super) fn nodes(&self) -> &[NodeIdx; 8] {
         &self.nodes
+    }
+
+    /// Gauss points with their deformation.
+    pub(super) fn points_at(&self, x: &[Vector3<f64>]) -> impl Iterator<Item = (&GaussPoint, Deformation)> {
+        let u = self.displacements(x);
+        self.points.iter().map(move |point| (point, deformation(&u, &point.gradients)))
+    }
+
+    pub(super) fn shear_modulus(&self) -> f64 {
+        self.law.mu
     }
 
     pub(super) fn value(&self, x: &[Vector3<f64>]) -> f64 {
