@@ -94,7 +94,7 @@ impl Count {
         self.solved += 1;
         self.seconds += seconds;
         match result {
-            Ok(AccurateResult { solve, tool_force, unguarded, offsets }) => {
+            Ok(AccurateResult { solve, tool_force, unguarded, .. }) => {
                 self.accepted += 1;
                 let (steps, j, force) = (solve.iterations, solve.smallest_jacobian, tool_force.norm());
                 print!(
@@ -102,15 +102,13 @@ impl Count {
                 );
                 if let Some(unguarded) = unguarded {
                     self.guarded += 1;
-                    let worth = unguarded.worth(Some(offsets), areas);
-                    let moved = worth.to_accepted.map_or(0.0, |d| d.rms_m);
+                    let worth = unguarded.worth(areas);
                     let [x, y, z] = worth.worst_m.map(|c| 1e3 * c);
-                    print!(
-                        "; without the guard: residual {:.1e}, J {:.3} at {x:.0} {y:.0} {z:.0} mm, skin {:.4} mm RMS away",
-                        worth.residual,
-                        worth.smallest_jacobian,
-                        1e3 * moved
-                    );
+                    let (residual, j) = (worth.residual, worth.smallest_jacobian);
+                    print!("; without the guard: residual {residual:.1e}, J {j:.3} at {x:.0} {y:.0} {z:.0} mm");
+                    if let Some(distance) = worth.to_accepted {
+                        print!(", skin {:.4} mm RMS away", 1e3 * distance.rms_m);
+                    }
                 }
                 println!();
             }

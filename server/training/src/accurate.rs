@@ -1,9 +1,9 @@
 //! The accurate half of the tandem: quasi-static solves from rest, tied, loaded, or with contact of their own.
 
+mod pressed;
+
 use nalgebra::Vector3;
-use plica_accurate::contact::{
-    ContactError, ContactParams, ContactProgress, ContactState, ContactSurface, Obstacle, Press,
-};
+use plica_accurate::contact::{ContactParams, ContactSurface};
 use plica_accurate::{Constraints, Energy, NodalForces, Params, Progress, Solid, SolveError, Solver, Tie, TurnGuard};
 use plica_geometry::{Embedding, EmbeddingKind, HexIdx, HexMesh, NodeIdx, Skin, isoparametric};
 use serde::{Deserialize, Serialize};
@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 use crate::coarse::{Interrupted, SolveObserver};
 use crate::error::BuildError;
 use crate::setup::AccurateDescription;
-use crate::tool_path::ToolPath;
 use crate::worth::Unguarded;
+pub use pressed::Touch;
 
 /// A result with an element below this `det F` is not stored.
 pub const SMALLEST_JACOBIAN: f64 = 0.05;
@@ -150,7 +150,7 @@ impl Accurate {
     pub fn tied(&mut self, tie: &Tie, observer: SolveObserver<'_>) -> Result<AccurateResult, AccurateFailure> {
         let mut x = self.rest.clone();
         let free = self.minimise(&[tie], None, &mut x, observer);
-        let (mut sum, unguarded) = match free {
+        let (mut sum, mut unguarded) = match free {
             Ok(solve) if solve.is_turned_over() => (solve, Box::new(self.unguarded(&x, solve))),
             Ok(solve) => {
                 let (offsets, tool_force) = (self.offsets(&x), -tie.force(&x));
@@ -166,6 +166,7 @@ impl Accurate {
             }
         }
         let (offsets, tool_force) = (self.offsets(&x), -tie.force(&x));
+        unguarded.accepted = (!sum.is_turned_over()).then(|| offsets.clone());
         Ok(AccurateResult { offsets, tool_force, solve: sum, unguarded: Some(unguarded) })
     }
 
@@ -196,87 +197,6 @@ impl Accurate {
         }
         let tool_force = -skin_forces.iter().sum::<Vector3<f64>>();
         Ok(AccurateResult { offsets: self.offsets(&x), tool_force, solve: solve?, unguarded: None })
-    }
-
-    /// From rest, with the model's own unilateral frictional contact: the tool follows `path`. Where elements turn over or no
-    /// equilibrium is found, again with a guard, in shorter increments.
-    ///
-    /// # Errors
-    /// See [`AccurateFailure`].
-    pub fn pressed(
-        &mut self,
-        obstacle: &Obstacle,
-        friction: f64,
-        path: &ToolPath,
-        observer: SolveObserver<'_>,
-    ) -> Result<AccurateResult, AccurateFailure> {
-        let touch = Touch { obstacle, friction, path };
-        let (mut sum, unguarded) = match self.press(&touch, None, observer) {
-            Ok(AccurateResult { solve, unguarded: Some(unguarded), .. }) => (solve, unguarded),
-            Err(AccurateFailure::Failed(_, unguarded)) => (unguarded.solve, unguarded),
-            other => return other,
-        };
-        let mut last = None;
-        for stiffness in GUARD_STIFFNESSES {
-            let result = self.press(&touch, Some(stiffness), observer)?;
-            sum = sum.followed_by(&result.solve);
-            let is_over = !result.solve.is_turned_over();
-            last = Some(AccurateResult { solve: sum, unguarded: None, ..result });
-            if is_over {
-                break;
-            }
-        }
-        let result = last.expect("guards are tried");
-        Ok(AccurateResult { unguarded: Some(unguarded), ..result })
-    }
-
-    fn press(
-        &mut self,
-        touch: &Touch<'_>,
-        guard: Option<f64>,
-        observer: SolveObserver<'_>,
-    ) -> Result<AccurateResult, AccurateFailure> {
-        let mut x = self.rest.clone();
-        if self.weight.is_some() {
-            self.minimise(&[], guard, &mut x, observer)?;
-        }
-        let poses = touch.path.poses();
-        let mut state = ContactState::untouched(&self.surface, &poses[0], &x);
-        let guard = guard.map(|ratio| TurnGuard { solid: &self.solid, floor: GUARD_FLOOR, stiffness_ratio: ratio });
-        let guard = guard.iter().map(|g| g as &dyn Energy);
-        let energies: Vec<_> = energies(&self.solid, &self.weight, &[]).into_iter().chain(guard).collect();
-        let setting = Press {
-            energies: &energies,
-            constraints: &self.constraints,
-            surface: &self.surface,
-            obstacle: touch.obstacle,
-            friction: touch.friction,
-            params: self.contact,
-        };
-        let mut last = SolveInfo::default();
-        let mut watch = |progress: ContactProgress| {
-            last.residual = progress.newton.residual;
-            last.iterations += u32::from(progress.newton.iteration > 0);
-            observer()
-        };
-        match setting.follow(&poses[1..], &mut self.solver, &mut state, &mut x, &mut watch) {
-            Ok(info) => {
-                let solve = SolveInfo {
-                    iterations: info.newton_iterations,
-                    indefinite_steps: info.indefinite_steps,
-                    residual: info.residual,
-                    smallest_jacobian: info.smallest_jacobian.unwrap_or(1.0),
-                };
-                let unguarded = solve.is_turned_over().then(|| Box::new(self.unguarded(&x, solve)));
-                Ok(AccurateResult { offsets: self.offsets(&x), tool_force: info.force_n, solve, unguarded })
-            }
-            Err(ContactError::Cancelled { .. }) => Err(AccurateFailure::Interrupted),
-            Err(error) => {
-                let smallest_jacobian = self.solid.smallest_jacobian(&x).unwrap_or(1.0);
-                let unguarded = self.unguarded(&x, SolveInfo { smallest_jacobian, ..last });
-                Err(AccurateFailure::Failed(error.to_string(), Box::new(unguarded)))
-            }
-        }
     }
 
     fn minimise(
@@ -318,7 +238,7 @@ impl Accurate {
 
     fn unguarded(&self, x: &[Vector3<f64>], solve: SolveInfo) -> Unguarded {
         let worst = self.solid.most_compressed(x).map(|hex| self.centres[hex.index()]);
-        Unguarded { solve, worst_m: worst.unwrap_or_default(), offsets: self.offsets(x) }
+        Unguarded { solve, worst_m: worst.unwrap_or_default(), offsets: self.offsets(x), accepted: None }
     }
 
     /// `A_a (x_a - x_a(rest))`: the skin's own rest positions stay what they are.
@@ -326,13 +246,6 @@ impl Accurate {
         let displacements: Vec<_> = x.iter().zip(&self.rest).map(|(x, rest)| x - rest).collect();
         self.embedding.apply(&displacements)
     }
-}
-
-/// A tool, its friction and its path.
-struct Touch<'a> {
-    obstacle: &'a Obstacle,
-    friction: f64,
-    path: &'a ToolPath,
 }
 
 impl SolveInfo {

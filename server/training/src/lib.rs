@@ -34,7 +34,7 @@ mod tie_targets;
 mod tool_path;
 mod worth;
 
-pub use accurate::{Accurate, AccurateFailure, AccurateResult, AccurateSize, SMALLEST_JACOBIAN, SolveInfo};
+pub use accurate::{Accurate, AccurateFailure, AccurateResult, AccurateSize, SMALLEST_JACOBIAN, SolveInfo, Touch};
 pub use atomic_file::{sync_folder, write_atomically, write_json_atomically};
 pub use canonical::{fingerprint, hexadecimal, to_text};
 pub use coarse::{Coarse, CoarseResult, Interrupted, Settling, SolveObserver};

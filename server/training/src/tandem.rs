@@ -4,7 +4,7 @@ use nalgebra::Isometry3;
 use plica_accurate::contact::Obstacle;
 use plica_accurate::{Tie, TieTarget};
 
-use crate::accurate::{Accurate, AccurateFailure, AccurateResult, SMALLEST_JACOBIAN, SolveInfo};
+use crate::accurate::{Accurate, AccurateFailure, AccurateResult, SMALLEST_JACOBIAN, SolveInfo, Touch};
 use crate::coarse::{Coarse, CoarseResult, Interrupted, SolveObserver};
 use crate::error::BuildError;
 use crate::example::{Example, Outcome, Reason, Record, Rejection, difference, numbers, rows, to_f32};
@@ -303,9 +303,10 @@ impl<'a> Tandem<'a> {
             Load::Suction(forces) => self.accurate.loaded(forces, observer),
             Load::Tool(path) => {
                 // A recorded path has a pose every fraction of a millimetre, at which nothing need be solved.
-                let straight = matches!(interaction.action, Action::Follow { .. })
-                    .then(|| path.straightened(STRAIGHT_CELLS * self.accurate.cell_m()));
-                self.accurate.pressed(&self.obstacles[tool], friction, straight.as_ref().unwrap_or(path), observer)
+                let passes = matches!(interaction.action, Action::Follow { .. });
+                let straight = passes.then(|| path.straightened(STRAIGHT_CELLS * self.accurate.cell_m()));
+                let path = straight.as_ref().unwrap_or(path);
+                self.accurate.pressed(Touch { obstacle: &self.obstacles[tool], friction, path, passes }, observer)
             }
         };
         self.accept(result, Reason::IndependentNotConverged, Reason::IndependentInverted)
@@ -314,7 +315,7 @@ impl<'a> Tandem<'a> {
     /// Worth of the result without a guard beside the one with it, where that was needed.
     fn worth(&self, result: &AccurateResult) -> Option<Worth> {
         let unguarded = result.unguarded.as_ref()?;
-        Some(unguarded.worth(Some(&result.offsets), self.skin.vertex_areas()))
+        Some(unguarded.worth(self.skin.vertex_areas()))
     }
 
     fn accept(
@@ -323,7 +324,7 @@ impl<'a> Tandem<'a> {
         not_converged: Reason,
         inverted: Reason,
     ) -> Result<AccurateResult, Stop> {
-        let worth = |unguarded: &Unguarded| Some(Box::new(unguarded.worth(None, self.skin.vertex_areas())));
+        let worth = |unguarded: &Unguarded| Some(Box::new(unguarded.worth(self.skin.vertex_areas())));
         match result {
             Ok(result) if !result.solve.is_turned_over() => Ok(result),
             Ok(AccurateResult { solve: SolveInfo { smallest_jacobian, iterations, .. }, unguarded, .. }) => {

@@ -14,6 +14,8 @@ pub struct Unguarded {
     pub worst_m: [f64; 3],
     /// Skin offsets from rest, `[n_skin]` \[m\].
     pub offsets: Vec<Vector3<f64>>,
+    /// Those of the accepted result at the same pose, with a guard; none without such a result.
+    pub accepted: Option<Vec<Vector3<f64>>>,
 }
 
 /// Worth of a result.
@@ -44,10 +46,10 @@ pub struct SkinDistance {
 }
 
 impl Unguarded {
-    /// Worth of this state, beside the skin offsets of the accepted result if there is one; `areas: [n_skin]` \[m^2\].
-    pub fn worth(&self, accepted: Option<&[Vector3<f64>]>, areas: &[f64]) -> Worth {
+    /// Worth of this state; `areas: [n_skin]` \[m^2\].
+    pub fn worth(&self, areas: &[f64]) -> Worth {
         let SolveInfo { iterations, residual, smallest_jacobian, .. } = self.solve;
-        let to_accepted = accepted.map(|accepted| SkinDistance::between(&self.offsets, accepted, areas));
+        let to_accepted = self.accepted.as_ref().map(|accepted| SkinDistance::between(&self.offsets, accepted, areas));
         // JSON has no NaN.
         let residual = if residual.is_finite() { residual } else { f64::MAX };
         Worth { iterations, residual, smallest_jacobian, worst_m: self.worst_m, to_accepted }
@@ -69,10 +71,11 @@ mod tests {
 
     #[test]
     fn worth_tells_how_far_the_skin_is_from_the_accepted_one() {
-        let unguarded = Unguarded { offsets: vec![Vector3::zeros(); 2], ..Unguarded::default() };
-        let accepted = [Vector3::new(0.0, 3.0, 4.0), Vector3::zeros()];
-        let found = unguarded.worth(Some(&accepted), &[1.0, 3.0]).to_accepted.expect("there is an accepted skin");
+        let accepted = Some(vec![Vector3::new(0.0, 3.0, 4.0), Vector3::zeros()]);
+        let nothing = Unguarded { offsets: vec![Vector3::zeros(); 2], ..Unguarded::default() };
+        let unguarded = Unguarded { accepted, ..nothing.clone() };
+        let found = unguarded.worth(&[1.0, 3.0]).to_accepted.expect("there is an accepted skin");
         assert!((found.rms_m - 2.5).abs() < 1e-12 && (found.worst_m - 5.0).abs() < 1e-12, "{found:?}");
-        assert!(unguarded.worth(None, &[1.0, 3.0]).to_accepted.is_none());
+        assert!(nothing.worth(&[1.0, 3.0]).to_accepted.is_none());
     }
 }
