@@ -84,24 +84,44 @@ impl Tangent {
 
     /// `B` with `u^T B v = H[u a^T, v b^T]`.
     pub(crate) fn block(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> Matrix3<f64> {
-        let (f, c) = (&self.f, &self.cofactor);
-        let w = f * a.cross(b) * self.curvature;
+        self.block_of(&self.image(a), &self.image(b))
+    }
+
+    fn image(&self, gradient: &Vector3<f64>) -> Image {
+        Image { gradient: *gradient, by_f: self.f * gradient, by_cofactor: self.cofactor * gradient }
+    }
+
+    fn block_of(&self, a: &Image, b: &Image) -> Matrix3<f64> {
+        let w = self.f * a.gradient.cross(&b.gradient) * self.curvature;
         // u . (v x w) = -u^T [w]_x v.
         let bend = Matrix3::new(0.0, w.z, -w.y, -w.z, 0.0, w.x, w.y, -w.x, 0.0);
-        Matrix3::from_diagonal_element(self.identity * a.dot(b))
-            + f * a * (f * b).transpose() * self.along_f
-            + c * a * (c * b).transpose() * self.along_cofactor
-            + bend
-            + b * a.transpose() * self.transposition
-            + self.negative.lift(a, b)
+        let mut block = Matrix3::from_diagonal_element(self.identity * a.gradient.dot(&b.gradient))
+            + a.by_f * b.by_f.transpose() * self.along_f
+            + a.by_cofactor * b.by_cofactor.transpose() * self.along_cofactor
+            + bend;
+        if self.transposition != 0.0 {
+            block += b.gradient * a.gradient.transpose() * self.transposition;
+        }
+        if !self.negative.is_empty() {
+            block += self.negative.lift(&a.gradient, &b.gradient);
+        }
+        block
     }
 
     /// Adds `weight` times [`Tangent::block`] of every pair of gradients to `blocks[a][b]`, `b <= a`.
     pub(crate) fn add_blocks(&self, gradients: &[Vector3<f64>; 8], weight: f64, blocks: &mut [[Matrix3<f64>; 8]; 8]) {
+        let images = gradients.map(|gradient| self.image(&gradient));
         for a in 0..8 {
             for b in 0..=a {
-                blocks[a][b] += self.block(&gradients[a], &gradients[b]) * weight;
+                blocks[a][b] += self.block_of(&images[a], &images[b]) * weight;
             }
         }
     }
+}
+
+/// A gradient with its products, which every block of it shares.
+struct Image {
+    gradient: Vector3<f64>,
+    by_f: Vector3<f64>,
+    by_cofactor: Vector3<f64>,
 }
