@@ -53,7 +53,7 @@ pub use job_folder::{JobPaths, MAX_RECORD_BYTES, Writer};
 pub use plan::plan;
 pub use random::GENERATOR;
 pub use regular_file::{FileFault, RegularFile};
-pub use report::{Run, Solves, Spread, Summary, TrainingReport, largest, rms};
+pub use report::{Guarded, Run, Solves, Spread, Summary, TrainingReport, largest, rms};
 pub use sensitivity::{Difference, Force, Sensitivity, Variations, sensitivity};
 pub use setup::{
     AccurateDescription, Approach, DriveOptions, FeatureScales, IN_REGION, InteractionSet, PressRanges, RecordedPose,

@@ -34,6 +34,8 @@ fn example(index: u32, two_references: bool) -> Example {
             n_tied: 30,
             tied: solve,
             independent: two_references.then_some(solve),
+            tied_unguarded: None,
+            independent_unguarded: None,
             interaction_sha256: "b".repeat(64),
         },
     }

@@ -178,6 +178,28 @@ fn what_cannot_be_solved_is_listed_and_not_stored() {
     assert_eq!((again.run.solved, again.run.resumed), (0, 2), "a rejection is not tried again");
 }
 
+/// Deep presses turn elements over at the rim of the tie, unless a guard holds them.
+#[test]
+fn elements_that_turn_over_are_held_and_the_record_says_so() {
+    let mut setup = common::tiny();
+    let Source::Press(ranges) = &setup.training.source else { panic!() };
+    let deep = PressRanges { depth_share: [0.5, 0.6], drag_m: [0.004, 0.005], drag_share: 1.0, ..ranges.clone() };
+    setup.training.source = Source::Press(deep);
+    let folder = TempDir::new().unwrap();
+    let report = train(&setup, &folder, DatabaseKind::Training, 1, &mut Counting::patient()).unwrap();
+    println!("{:?}\n{:?}", report.result.guarded, report.result.rejected);
+    let database = Database::read(&folder.path().join("database.safetensors"), None).unwrap();
+    let guarded = database.examples.iter().filter_map(|e| Some((&e.record.tied, e.record.tied_unguarded?)));
+    assert!(guarded.clone().count() > 0, "no element turned over");
+    for (tied, unguarded) in guarded {
+        assert!(unguarded.smallest_jacobian < SMALLEST_JACOBIAN && tied.smallest_jacobian >= SMALLEST_JACOBIAN);
+        assert!(tied.residual <= 1e-8, "{tied:?}");
+        let distance = unguarded.to_accepted.expect("the accepted skin is at hand");
+        assert!(distance.rms_m > 0.0 && distance.worst_m < 5e-3, "{distance:?}");
+        assert!(unguarded.worst_m.iter().zip([0.04, 0.04, 0.02]).all(|(x, size)| (0.0..size).contains(x)));
+    }
+}
+
 #[test]
 fn a_job_without_an_example_fails_and_says_why() {
     let mut setup = common::tiny();
