@@ -6,16 +6,14 @@ use nalgebra::Vector3;
 use plica_accurate::contact::{ContactParams, ContactSurface};
 use plica_accurate::{Constraints, Energy, NodalForces, Params, Progress, Solid, SolveError, Solver, Tie, TurnGuard};
 use plica_geometry::{Embedding, EmbeddingKind, HexIdx, HexMesh, NodeIdx, Skin, isoparametric};
-use serde::{Deserialize, Serialize};
 
 use crate::coarse::{Interrupted, SolveObserver};
 use crate::error::BuildError;
 use crate::setup::AccurateDescription;
+use crate::solve_info::SolveInfo;
 use crate::worth::Unguarded;
 pub use pressed::Touch;
 
-/// A result with an element below this `det F` is not stored.
-pub const SMALLEST_JACOBIAN: f64 = 0.05;
 /// Relative volume below which the guard of a repeated solve holds a Gauss point.
 const GUARD_FLOOR: f64 = 0.2;
 /// Stiffnesses of that guard over the shear modulus, softest first: the first that suffices is taken.
@@ -66,20 +64,6 @@ pub struct AccurateSize {
     pub n_unknowns: usize,
     /// Values of the Cholesky factor.
     pub n_factor_values: usize,
-}
-
-/// How an accurate solve went.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SolveInfo {
-    /// Newton steps.
-    pub iterations: u32,
-    /// Newton steps whose matrix was not positive definite.
-    pub indefinite_steps: u32,
-    /// Largest force left at a free coordinate, as a share of the largest nodal force.
-    pub residual: f64,
-    /// Smallest `det F`.
-    pub smallest_jacobian: f64,
 }
 
 /// Why there is no equilibrium.
@@ -245,22 +229,6 @@ impl Accurate {
     fn offsets(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         let displacements: Vec<_> = x.iter().zip(&self.rest).map(|(x, rest)| x - rest).collect();
         self.embedding.apply(&displacements)
-    }
-}
-
-impl SolveInfo {
-    /// Whether an element is all but inverted.
-    pub fn is_turned_over(&self) -> bool {
-        self.smallest_jacobian < SMALLEST_JACOBIAN
-    }
-
-    /// Of this solve and the one that went on from it.
-    pub fn followed_by(&self, next: &Self) -> Self {
-        Self {
-            iterations: self.iterations + next.iterations,
-            indefinite_steps: self.indefinite_steps + next.indefinite_steps,
-            ..*next
-        }
     }
 }
 

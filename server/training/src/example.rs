@@ -3,8 +3,8 @@
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::accurate::SolveInfo;
 use crate::coarse::Settling;
+use crate::solve_info::SolveInfo;
 use crate::worth::Worth;
 use plica_geometry::ContactFrame;
 use plica_sim::enrichment::Touch;

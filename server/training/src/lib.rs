@@ -28,13 +28,14 @@ mod regular_file;
 mod report;
 mod sensitivity;
 mod setup;
+mod solve_info;
 mod suction;
 mod tandem;
 mod tie_targets;
 mod tool_path;
 mod worth;
 
-pub use accurate::{Accurate, AccurateFailure, AccurateResult, AccurateSize, SMALLEST_JACOBIAN, SolveInfo, Touch};
+pub use accurate::{Accurate, AccurateFailure, AccurateResult, AccurateSize, Touch};
 pub use atomic_file::{sync_folder, write_atomically, write_json_atomically};
 pub use canonical::{fingerprint, hexadecimal, to_text};
 pub use coarse::{Coarse, CoarseResult, Interrupted, Settling, SolveObserver};
@@ -59,6 +60,7 @@ pub use setup::{
     AccurateDescription, Approach, DriveOptions, FeatureScales, IN_REGION, InteractionSet, PressRanges, RecordedPose,
     Setup, Source,
 };
+pub use solve_info::{SMALLEST_JACOBIAN, SolveInfo};
 pub use tandem::{CoarseHalf, Load, Stop, Tandem};
 pub use tool_path::ToolPath;
 pub use worth::{SkinDistance, Unguarded, Worth};

@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use crate::accurate::{AccurateSize, SolveInfo};
+use crate::accurate::AccurateSize;
 use crate::database::{Database, DatabaseKind};
 use crate::example::{Example, Record, Rejection};
 use crate::setup::Setup;
+use crate::solve_info::SolveInfo;
 use crate::worth::Worth;
 use plica_geometry::ReferenceSkin;
 

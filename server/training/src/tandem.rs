@@ -4,13 +4,14 @@ use nalgebra::Isometry3;
 use plica_accurate::contact::Obstacle;
 use plica_accurate::{Tie, TieTarget};
 
-use crate::accurate::{Accurate, AccurateFailure, AccurateResult, SMALLEST_JACOBIAN, SolveInfo, Touch};
+use crate::accurate::{Accurate, AccurateFailure, AccurateResult, Touch};
 use crate::coarse::{Coarse, CoarseResult, Interrupted, SolveObserver};
 use crate::error::BuildError;
 use crate::example::{Example, Outcome, Reason, Record, Rejection, difference, numbers, rows, to_f32};
 use crate::interaction::{Action, Interaction, to_numbers};
 use crate::obstacle::obstacle;
 use crate::setup::Setup;
+use crate::solve_info::{SMALLEST_JACOBIAN, SolveInfo};
 use crate::suction::{Disc, LiftTarget, lift};
 use crate::tie_targets::{around_tool, under_disc};
 use crate::tool_path::ToolPath;

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::accurate::SolveInfo;
+use crate::solve_info::SolveInfo;
 
 /// The last state of a solve without a guard.
 #[derive(Debug, Clone, Default)]

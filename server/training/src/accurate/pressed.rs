@@ -6,8 +6,9 @@ use plica_accurate::contact::{
 };
 use plica_accurate::{Energy, TurnGuard};
 
-use super::{Accurate, AccurateFailure, AccurateResult, GUARD_FLOOR, GUARD_STIFFNESSES, SolveInfo, energies};
+use super::{Accurate, AccurateFailure, AccurateResult, GUARD_FLOOR, GUARD_STIFFNESSES, energies};
 use crate::coarse::SolveObserver;
+use crate::solve_info::SolveInfo;
 use crate::tool_path::ToolPath;
 use crate::worth::Unguarded;
 
