@@ -29,5 +29,5 @@ pub use loads::{Couple, NodalForces, Pressure, Traction, body_forces, face_area,
 pub use material::{Fibres, Lame, Material, MaterialError, MaterialModel};
 pub use newton::{ArcState, Info, Loading, Mode, Params, Progress, SolveError, Solver};
 pub use reaction::reactions;
-pub use solid::{GAUSS_POINTS, Solid, SolidError};
+pub use solid::{GAUSS_POINTS, Solid, SolidError, TurnGuard};
 pub use tie::{TIE_VERSION, Tie, TieOptions, TieTarget};

@@ -2,6 +2,7 @@
 
 mod carried;
 mod element;
+mod guard;
 mod recovery;
 mod tetrahedra;
 
@@ -13,6 +14,7 @@ use crate::hessian::Hessian;
 use crate::material::{Law, Material, MaterialError};
 use carried::Carried;
 use element::Element;
+pub use guard::TurnGuard;
 
 /// Reference coordinates of the 2 x 2 x 2 Gauss points, in the order of the corners.
 pub const GAUSS_POINTS: [[f64; 3]; 8] = {
@@ -167,6 +169,12 @@ impl Solid {
     /// Smallest `det F` over the Gauss points of each element, `[n_elements]`.
     pub fn smallest_jacobians(&self, x: &[Vector3<f64>]) -> Vec<f64> {
         with_elements!(&self.elements, list => list.iter().map(|e| e.smallest_jacobian(x)).collect())
+    }
+
+    /// The element with the smallest `det F` at a Gauss point.
+    pub fn most_compressed(&self, x: &[Vector3<f64>]) -> Option<ElementIdx> {
+        let smallest = self.smallest_jacobians(x).into_iter().enumerate();
+        smallest.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(element, _)| ElementIdx::from_index(element))
     }
 
     /// Volume \[m^3\] of the deformed solid.

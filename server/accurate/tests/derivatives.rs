@@ -10,7 +10,7 @@ use common::{MODELS, distorted_block, material, rest};
 use nalgebra::{Point3, Vector3};
 use plica_accurate::{
     Couple, Energy, Material, MaterialModel, NodalForces, Pressure, Projection, Solid, Tie, TieOptions, TieTarget,
-    Traction,
+    Traction, TurnGuard,
 };
 use plica_geometry::{Embedding, EmbeddingKind, HexMesh, NodeIdx, VertexIdx};
 
@@ -55,6 +55,20 @@ fn stable_neo_hookean_solid_turned_over() {
     let mirrored: Vec<_> = rest(&mesh).iter().map(|x| Vector3::new(x.x, x.y, -x.z)).collect();
     assert!(solid.smallest_jacobian(&mirrored).unwrap() < 0.0);
     check_derivatives("mirrored solid", &solid, &mirrored, CELL);
+}
+
+#[test]
+fn guards_against_turning_over() {
+    let mesh = mesh();
+    let solid = Solid::uniform(&mesh, material(MaterialModel::StableNeoHookean, 3e4, 0.45)).unwrap();
+    let guard = TurnGuard { solid: &solid, floor: 0.4, stiffness_ratio: 10.0 };
+    let mut random = Random::new(4);
+    assert_eq!(guard.value(&rest(&mesh)), 0.0);
+    for state in 0..4 {
+        let x = random.scatter(&rest(&mesh), 0.8 * CELL);
+        assert!(guard.value(&x) > 0.0);
+        check_derivatives(&format!("guard, state {state}"), &guard, &x, CELL);
+    }
 }
 
 #[test]

@@ -63,8 +63,17 @@ pub fn block(size_m: [f64; 3], divisions: [usize; 3]) -> HexMesh {
 /// # Panics
 /// If a size is not positive and finite or a division is 0.
 pub fn wedge(wedge: &Wedge, divisions: [usize; 3]) -> HexMesh {
+    graded_wedge(wedge, divisions, [1.0; 3])
+}
+
+/// The same with hexahedra whose lengths along x, y, z grow as those of [`hexahedron`].
+///
+/// # Panics
+/// If a size or a grading is not positive and finite or a division is 0.
+pub fn graded_wedge(wedge: &Wedge, divisions: [usize; 3], grading: [f64; 3]) -> HexMesh {
     wedge.check();
-    let share = |i: usize, axis: usize| i as f64 / divisions[axis] as f64;
+    check_grading(&grading);
+    let share = |i: usize, axis: usize| graded_share(i, divisions[axis], grading[axis]);
     let nodes = lattice_nodes(divisions, |[i, j, k]| {
         let x = share(i, 0) * wedge.length_m;
         Point3::new(x, share(j, 1) * wedge.width_m, share(k, 2) * wedge.height_m(x))
@@ -95,12 +104,16 @@ pub struct Hexahedron {
 /// If a division is 0 or a grading is not positive and finite.
 pub fn hexahedron(shape: &Hexahedron) -> Result<HexMesh, MeshError> {
     let Hexahedron { corners, divisions, grading } = shape;
-    assert!(grading.iter().all(|g| g.is_finite() && *g > 0.0), "gradings must be positive, they are {grading:?}");
+    check_grading(grading);
     let nodes = lattice_nodes(*divisions, |at| {
         let xi = [0, 1, 2].map(|k| 2.0 * graded_share(at[k], divisions[k], grading[k]) - 1.0);
         isoparametric::map(corners, xi)
     });
     lattice_mesh(nodes, *divisions)
+}
+
+fn check_grading(grading: &[f64; 3]) {
+    assert!(grading.iter().all(|g| g.is_finite() && *g > 0.0), "gradings must be positive, they are {grading:?}");
 }
 
 fn graded_share(i: usize, n: usize, grading: f64) -> f64 {

@@ -14,7 +14,7 @@ use plica_training::{FileFault, RegularFile, fingerprint};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use crate::scene::{Config, MAX_FILE_BYTES, MeshConfig, ObjectConfig, Region};
+use crate::scene::{AccurateConfig, AccurateMesh, Config, MAX_FILE_BYTES, MeshConfig, ObjectConfig, Region};
 
 /// Version of the hash, raised when its meaning changes.
 const HASH_VERSION: u32 = 1;
@@ -62,7 +62,7 @@ fn object(object: &ObjectConfig) -> Value {
             EmbeddingKind::MovingLeastSquares { support_cells } => json!({ "support_cells": support_cells }),
             EmbeddingKind::Trilinear => json!("trilinear"),
         }},
-        "accurate": { "divisions": accurate.divisions, "material": accurate_material(&accurate.material) },
+        "accurate": accurate_model(accurate),
         "tie": { "compliance_m": tie.compliance_m, "band_m": tie.band_m, "rim_floor": tie.rim_floor },
     })
 }
@@ -76,6 +76,16 @@ fn mesh(mesh: &MeshConfig) -> Value {
 
 fn material(m: &Material) -> Value {
     json!([m.young_modulus_pa, m.poisson_ratio, m.density_kg_per_m3])
+}
+
+/// An even mesh has no gradings, so that the hash of a scene is what it was before there were any.
+fn accurate_model(accurate: &AccurateConfig) -> Value {
+    let AccurateMesh { divisions, grading } = accurate.mesh;
+    let mut model = json!({ "divisions": divisions, "material": accurate_material(&accurate.material) });
+    if grading != [1.0; 3] {
+        model["grading"] = json!(grading);
+    }
+    model
 }
 
 fn accurate_material(m: &plica_accurate::Material) -> Value {
@@ -153,6 +163,7 @@ mod tests {
             ("faces = [\"z_min\"]", "faces = [\"x_min\"]"),
             ("divisions = [8, 4, 4]", "divisions = [8, 4, 3]"),
             ("divisions = [32, 16, 8]", "divisions = [32, 16, 9]"),
+            ("grading = [1.0, 1.0, 1.0]", "grading = [1.0, 1.0, 0.5]"),
             ("element = \"enhanced_strain\"", "element = \"full_integration\""),
             ("spacing_m = 0.00122", "spacing_m = 0.00123"),
             ("embedding = \"moving_least_squares\"", "embedding = \"trilinear\""),
@@ -206,6 +217,7 @@ mod tests {
         // Keys that are left out are their defaults.
         assert_eq!(with("element = \"enhanced_strain\"", "# element ="), own);
         assert_eq!(with("rim_floor = 1e-4", "# rim_floor ="), own);
+        assert_eq!(with("grading = [1.0, 1.0, 1.0]", "# grading ="), own);
     }
 
     #[test]

@@ -1,11 +1,12 @@
 //! Model descriptions from a checked scene.
 
 use nalgebra::{Point3, Vector3};
+use plica_geometry::shapes::Wedge;
 use plica_geometry::{Embedding, EmbeddingError, HexIdx, HexMesh, Skin, shapes};
 use plica_sim::{Material, Model, ModelDescription, ModelError};
 use plica_training::AccurateDescription;
 
-use crate::scene::{Config, Face, FixedConfig, MeshConfig, ObjectConfig, Region};
+use crate::scene::{AccurateMesh, Config, Face, FixedConfig, MeshConfig, ObjectConfig, Region};
 
 /// Distance of a node from a face at which it lies on the face, as a share of the object's size.
 const ON_FACE: f64 = 1e-6;
@@ -86,12 +87,9 @@ pub fn describe(config: &Config) -> Result<ModelDescription, SceneModelError> {
 ///
 /// # Errors
 /// [`SceneModelError::EmptySupport`].
-pub fn describe_accurate(
-    config: &Config,
-    divisions: Option<[usize; 3]>,
-) -> Result<AccurateDescription, SceneModelError> {
+pub fn describe_accurate(config: &Config, mesh: Option<AccurateMesh>) -> Result<AccurateDescription, SceneModelError> {
     let (object, accurate) = (config.object(), config.object().accurate());
-    let mesh = generate_mesh(object, divisions.unwrap_or(accurate.divisions));
+    let mesh = generate_mesh(object, mesh.unwrap_or(accurate.mesh));
     let regions: Vec<_> = mesh.hex_indices().map(|hex| region_of(object, &mesh, hex)).collect();
     let material = |region: &Option<&Region>| region.map_or(accurate.material, |r| r.accurate);
     let density = |region: &Option<&Region>| region.map_or(object.material(), |r| r.coarse).density_kg_per_m3;
@@ -114,13 +112,20 @@ fn generate(object: &ObjectConfig) -> (HexMesh, Skin) {
         MeshConfig::Wedge(wedge) => shapes::wedge_skin(wedge, spacing),
         MeshConfig::Block(size) => shapes::block_skin(*size, spacing),
     };
-    (generate_mesh(object, object.divisions()), skin)
+    (generate_mesh(object, AccurateMesh { divisions: object.divisions(), grading: [1.0; 3] }), skin)
 }
 
-fn generate_mesh(object: &ObjectConfig, divisions: [usize; 3]) -> HexMesh {
+fn generate_mesh(object: &ObjectConfig, mesh: AccurateMesh) -> HexMesh {
+    let AccurateMesh { divisions, grading } = mesh;
+    let block = |[length_m, width_m, height_m]: [f64; 3]| Wedge {
+        length_m,
+        width_m,
+        thick_height_m: height_m,
+        thin_height_m: height_m,
+    };
     match object.mesh() {
-        MeshConfig::Wedge(wedge) => shapes::wedge(wedge, divisions),
-        MeshConfig::Block(size) => shapes::block(*size, divisions),
+        MeshConfig::Wedge(wedge) => shapes::graded_wedge(wedge, divisions, grading),
+        MeshConfig::Block(size) => shapes::graded_wedge(&block(*size), divisions, grading),
     }
 }
 
@@ -229,7 +234,8 @@ mod tests {
         assert_eq!(accurate.fixed.iter().filter(|f| **f).count(), 33 * 17);
         let text = text.replacen("young_modulus_pa = 1e6", "poisson_ratio = 0.1", 1);
         let config = Config::parse(Path::new("scene.toml"), &text).unwrap();
-        let accurate = describe_accurate(&config, Some([4, 2, 2])).unwrap();
+        let accurate =
+            describe_accurate(&config, Some(AccurateMesh { divisions: [4, 2, 2], grading: [1.0; 3] })).unwrap();
         assert_eq!(accurate.materials.iter().filter(|m| m.poisson_ratio == 0.1).count(), 8);
         assert!(accurate.materials.iter().all(|m| m.young_modulus_pa == 3e4));
     }

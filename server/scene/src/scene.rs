@@ -17,7 +17,7 @@ use std::sync::OnceLock;
 use plica_sim::{ContactOptions, Plane, SleepOptions, ToolDescription};
 use schemars::Schema;
 
-pub use accurate::AccurateConfig;
+pub use accurate::{AccurateConfig, AccurateMesh};
 pub use bench::{BenchConfig, Keyframe};
 pub use enrichment::EnrichmentConfig;
 pub use files::{MAX_FILE_BYTES, SceneFile};

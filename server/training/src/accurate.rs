@@ -1,16 +1,23 @@
 //! The accurate half of the tandem: quasi-static solves from rest, tied, loaded, or with contact of their own.
 
+mod pressed;
+
 use nalgebra::Vector3;
-use plica_accurate::contact::{ContactError, ContactParams, ContactState, ContactSurface, Obstacle, Press};
-use plica_accurate::{Constraints, Energy, NodalForces, Params, Progress, Solid, SolveError, Solver, Tie};
+use plica_accurate::contact::{ContactParams, ContactSurface};
+use plica_accurate::{Constraints, Energy, NodalForces, Params, Progress, Solid, SolveError, Solver, Tie, TurnGuard};
 use plica_geometry::{Embedding, EmbeddingKind, HexIdx, HexMesh, NodeIdx, Skin, isoparametric};
-use serde::{Deserialize, Serialize};
 
 use crate::coarse::{Interrupted, SolveObserver};
 use crate::error::BuildError;
 use crate::setup::AccurateDescription;
-use crate::tool_path::ToolPath;
+use crate::solve_info::SolveInfo;
+use crate::worth::Unguarded;
+pub use pressed::Touch;
 
+/// Relative volume below which the guard of a repeated solve holds a Gauss point.
+const GUARD_FLOOR: f64 = 0.2;
+/// Stiffnesses of that guard over the shear modulus, softest first: the first that suffices is taken.
+const GUARD_STIFFNESSES: [f64; 3] = [10.0, 100.0, 1000.0];
 /// Largest force left at a free coordinate, as a share of the largest nodal force.
 const TOLERANCE: f64 = 1e-8;
 /// Newton steps after which a solve gives up.
@@ -30,6 +37,10 @@ pub struct Accurate {
     embedding: Embedding,
     surface: ContactSurface,
     contact: ContactParams,
+    /// Mean longest edge of a hexahedron \[m\].
+    cell_m: f64,
+    /// Centre of each hexahedron at rest \[m\].
+    centres: Vec<[f64; 3]>,
     solver: Solver,
 }
 
@@ -42,6 +53,8 @@ pub struct AccurateResult {
     pub tool_force: Vector3<f64>,
     /// How the solve went.
     pub solve: SolveInfo,
+    /// The result without the guard, where elements of that one turned over.
+    pub unguarded: Option<Box<Unguarded>>,
 }
 
 /// Size of the accurate model's linear systems.
@@ -53,27 +66,13 @@ pub struct AccurateSize {
     pub n_factor_values: usize,
 }
 
-/// How an accurate solve went.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SolveInfo {
-    /// Newton steps.
-    pub iterations: u32,
-    /// Newton steps whose matrix was not positive definite.
-    pub indefinite_steps: u32,
-    /// Largest force left at a free coordinate, as a share of the largest nodal force.
-    pub residual: f64,
-    /// Smallest `det F`.
-    pub smallest_jacobian: f64,
-}
-
 /// Why there is no equilibrium.
 #[derive(Debug)]
 pub enum AccurateFailure {
     /// Asked to stop.
     Interrupted,
-    /// It was not found.
-    Failed(String),
+    /// It was not found: why, and the last state.
+    Failed(String, Box<Unguarded>),
 }
 
 impl From<Interrupted> for AccurateFailure {
@@ -102,11 +101,19 @@ impl Accurate {
         let surface = ContactSurface::of_boundary(mesh, &constraints);
         let moduli = description.materials.iter().map(|m| m.young_modulus_pa);
         let softest = moduli.fold(f64::INFINITY, f64::min);
-        let contact = ContactParams::new(softest, INCREMENT_CELLS * mesh.mean_longest_edge());
+        let cell_m = mesh.mean_longest_edge();
+        let contact = ContactParams::new(softest, INCREMENT_CELLS * cell_m);
+        let centre = |hex| mesh.corner_positions(hex).iter().map(|p| p.coords / 8.0).sum::<Vector3<f64>>().into();
+        let centres = mesh.hex_indices().map(centre).collect();
         let solver = Solver::new(&constraints, &[&solid]).map_err(SolveError::from)?;
         let weight = (*gravity_m_per_s2 != Vector3::zeros())
             .then(|| weight(mesh, &description.densities_kg_per_m3, gravity_m_per_s2));
-        Ok(Self { rest, solid, weight, constraints, embedding, surface, contact, solver })
+        Ok(Self { rest, solid, weight, constraints, embedding, surface, contact, cell_m, centres, solver })
+    }
+
+    /// Mean longest edge of the hexahedra \[m\].
+    pub fn cell_m(&self) -> f64 {
+        self.cell_m
     }
 
     /// Size of the linear systems.
@@ -120,14 +127,31 @@ impl Accurate {
         &self.embedding
     }
 
-    /// From rest, tied.
+    /// From rest, tied. Where elements turn over, again with a guard against it, as soft a one as suffices.
     ///
     /// # Errors
     /// See [`AccurateFailure`].
     pub fn tied(&mut self, tie: &Tie, observer: SolveObserver<'_>) -> Result<AccurateResult, AccurateFailure> {
         let mut x = self.rest.clone();
-        let solve = self.minimise(&[tie], &mut x, observer)?;
-        Ok(AccurateResult { offsets: self.offsets(&x), tool_force: -tie.force(&x), solve })
+        let free = self.minimise(&[tie], None, &mut x, observer);
+        let (mut sum, mut unguarded) = match free {
+            Ok(solve) if solve.is_turned_over() => (solve, Box::new(self.unguarded(&x, solve))),
+            Ok(solve) => {
+                let (offsets, tool_force) = (self.offsets(&x), -tie.force(&x));
+                return Ok(AccurateResult { offsets, tool_force, solve, unguarded: None });
+            }
+            Err(AccurateFailure::Failed(_, unguarded)) => (unguarded.solve, unguarded),
+            Err(interrupted) => return Err(interrupted),
+        };
+        for stiffness in GUARD_STIFFNESSES {
+            sum = sum.followed_by(&self.minimise(&[tie], Some(stiffness), &mut x, observer)?);
+            if !sum.is_turned_over() {
+                break;
+            }
+        }
+        let (offsets, tool_force) = (self.offsets(&x), -tie.force(&x));
+        unguarded.accepted = (!sum.is_turned_over()).then(|| offsets.clone());
+        Ok(AccurateResult { offsets, tool_force, solve: sum, unguarded: Some(unguarded) })
     }
 
     /// From rest, under forces at skin vertices, `[n_skin]` \[N\]. In load steps if it does not converge at once.
@@ -145,71 +169,38 @@ impl Accurate {
             NodalForces::new(loads.map(|(n, f)| (NodeIdx::from_index(n), f * share)).collect())
         };
         let mut x = self.rest.clone();
-        let mut solve = self.minimise(&[&share(1.0)], &mut x, observer);
-        if let Err(AccurateFailure::Failed(_)) = solve {
+        let mut solve = self.minimise(&[&share(1.0)], None, &mut x, observer);
+        if let Err(AccurateFailure::Failed(..)) = solve {
             x.copy_from_slice(&self.rest);
             let mut sum = SolveInfo::default();
             for step in 1..=LOAD_STEPS {
                 let load = share(f64::from(step) / f64::from(LOAD_STEPS));
-                sum = sum.followed_by(&self.minimise(&[&load], &mut x, observer)?);
+                sum = sum.followed_by(&self.minimise(&[&load], None, &mut x, observer)?);
             }
             solve = Ok(sum);
         }
         let tool_force = -skin_forces.iter().sum::<Vector3<f64>>();
-        Ok(AccurateResult { offsets: self.offsets(&x), tool_force, solve: solve? })
-    }
-
-    /// From rest, with the model's own unilateral frictional contact: the tool follows `path`.
-    ///
-    /// # Errors
-    /// See [`AccurateFailure`].
-    pub fn pressed(
-        &mut self,
-        obstacle: &Obstacle,
-        friction: f64,
-        path: &ToolPath,
-        observer: SolveObserver<'_>,
-    ) -> Result<AccurateResult, AccurateFailure> {
-        let mut x = self.rest.clone();
-        if self.weight.is_some() {
-            self.minimise(&[], &mut x, observer)?;
-        }
-        let (start, waypoints) = (path.poses()[0], &path.poses()[1..]);
-        let mut state = ContactState::untouched(&self.surface, &start, &x);
-        let energies: Vec<&dyn Energy> = energies(&self.solid, &self.weight, &[]);
-        let setting = Press {
-            energies: &energies,
-            constraints: &self.constraints,
-            surface: &self.surface,
-            obstacle,
-            friction,
-            params: self.contact,
-        };
-        let mut watch = |_| observer();
-        let info =
-            setting.follow(waypoints, &mut self.solver, &mut state, &mut x, &mut watch).map_err(|e| match e {
-                ContactError::Cancelled { .. } => AccurateFailure::Interrupted,
-                other => AccurateFailure::Failed(other.to_string()),
-            })?;
-        let solve = SolveInfo {
-            iterations: info.newton_iterations,
-            indefinite_steps: info.indefinite_steps,
-            residual: info.residual,
-            smallest_jacobian: info.smallest_jacobian.unwrap_or(1.0),
-        };
-        Ok(AccurateResult { offsets: self.offsets(&x), tool_force: info.force_n, solve })
+        Ok(AccurateResult { offsets: self.offsets(&x), tool_force, solve: solve?, unguarded: None })
     }
 
     fn minimise(
         &mut self,
         loads: &[&dyn Energy],
+        guard: Option<f64>,
         x: &mut [Vector3<f64>],
         observer: SolveObserver<'_>,
     ) -> Result<SolveInfo, AccurateFailure> {
-        let energies = energies(&self.solid, &self.weight, loads);
+        let Self { solid, solver, weight, constraints, .. } = &mut *self;
+        let guard = guard.map(|stiffness_ratio| TurnGuard { solid, floor: GUARD_FLOOR, stiffness_ratio });
+        let guard = guard.iter().map(|g| g as &dyn Energy);
+        let energies: Vec<_> = energies(solid, weight, loads).into_iter().chain(guard).collect();
         let params = Params { tolerance: TOLERANCE, max_iterations: MAX_ITERATIONS, ..Params::default() };
-        let mut watch = |_: Progress| observer();
-        match self.solver.minimise(&energies, &self.constraints, &params, x, &mut watch) {
+        let mut steps = 0;
+        let mut watch = |progress: Progress| {
+            steps = progress.iteration;
+            observer()
+        };
+        match solver.minimise(&energies, constraints, &params, x, &mut watch) {
             Ok(info) => Ok(SolveInfo {
                 iterations: info.iterations,
                 indefinite_steps: info.indefinite_steps,
@@ -217,25 +208,27 @@ impl Accurate {
                 smallest_jacobian: info.smallest_jacobian.unwrap_or(1.0),
             }),
             Err(SolveError::Cancelled { .. }) => Err(AccurateFailure::Interrupted),
-            Err(error) => Err(AccurateFailure::Failed(error.to_string())),
+            Err(error) => {
+                let solve = SolveInfo {
+                    iterations: steps,
+                    residual: error.residual().unwrap_or(f64::NAN),
+                    smallest_jacobian: self.solid.smallest_jacobian(x).unwrap_or(1.0),
+                    ..SolveInfo::default()
+                };
+                Err(AccurateFailure::Failed(error.to_string(), Box::new(self.unguarded(x, solve))))
+            }
         }
+    }
+
+    fn unguarded(&self, x: &[Vector3<f64>], solve: SolveInfo) -> Unguarded {
+        let worst = self.solid.most_compressed(x).map(|hex| self.centres[hex.index()]);
+        Unguarded { solve, worst_m: worst.unwrap_or_default(), offsets: self.offsets(x), accepted: None }
     }
 
     /// `A_a (x_a - x_a(rest))`: the skin's own rest positions stay what they are.
     fn offsets(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         let displacements: Vec<_> = x.iter().zip(&self.rest).map(|(x, rest)| x - rest).collect();
         self.embedding.apply(&displacements)
-    }
-}
-
-impl SolveInfo {
-    /// Of this solve and the one that went on from it.
-    pub fn followed_by(&self, next: &Self) -> Self {
-        Self {
-            iterations: self.iterations + next.iterations,
-            indefinite_steps: self.indefinite_steps + next.indefinite_steps,
-            ..*next
-        }
     }
 }
 

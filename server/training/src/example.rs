@@ -3,8 +3,9 @@
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::accurate::SolveInfo;
 use crate::coarse::Settling;
+use crate::solve_info::SolveInfo;
+use crate::worth::Worth;
 use plica_geometry::ContactFrame;
 use plica_sim::enrichment::Touch;
 
@@ -56,6 +57,12 @@ pub struct Record {
     /// How the solve with its own contact went; evaluation only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub independent: Option<SolveInfo>,
+    /// The tied result without a guard, where elements of that one turned over.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tied_unguarded: Option<Worth>,
+    /// The same of the solve with its own contact.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub independent_unguarded: Option<Worth>,
     /// [`Setup::fingerprint`](crate::Setup::fingerprint): a job that goes on checks that it is the planned one.
     pub interaction_sha256: String,
 }
@@ -96,6 +103,9 @@ pub struct Rejection {
     pub depth_m: f64,
     /// Drag that was drawn \[m\].
     pub drag_m: [f64; 3],
+    /// What the accurate result would have been worth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub worth: Option<Worth>,
     /// [`Setup::fingerprint`](crate::Setup::fingerprint).
     pub interaction_sha256: String,
 }

@@ -28,12 +28,14 @@ mod regular_file;
 mod report;
 mod sensitivity;
 mod setup;
+mod solve_info;
 mod suction;
 mod tandem;
 mod tie_targets;
 mod tool_path;
+mod worth;
 
-pub use accurate::{Accurate, AccurateFailure, AccurateResult, AccurateSize, SolveInfo};
+pub use accurate::{Accurate, AccurateFailure, AccurateResult, AccurateSize, Touch};
 pub use atomic_file::{sync_folder, write_atomically, write_json_atomically};
 pub use canonical::{fingerprint, hexadecimal, to_text};
 pub use coarse::{Coarse, CoarseResult, Interrupted, Settling, SolveObserver};
@@ -52,11 +54,13 @@ pub use job_folder::{JobPaths, MAX_RECORD_BYTES, Writer};
 pub use plan::plan;
 pub use random::GENERATOR;
 pub use regular_file::{FileFault, RegularFile};
-pub use report::{Run, Solves, Spread, Summary, TrainingReport, largest, rms};
+pub use report::{Guarded, Run, Solves, Spread, Summary, TrainingReport, largest, rms};
 pub use sensitivity::{Difference, Force, Sensitivity, Variations, sensitivity};
 pub use setup::{
     AccurateDescription, Approach, DriveOptions, FeatureScales, IN_REGION, InteractionSet, PressRanges, RecordedPose,
     Setup, Source,
 };
-pub use tandem::{CoarseHalf, Load, SMALLEST_JACOBIAN, Stop, Tandem};
+pub use solve_info::{SMALLEST_JACOBIAN, SolveInfo};
+pub use tandem::{CoarseHalf, Load, Stop, Tandem};
 pub use tool_path::ToolPath;
+pub use worth::{SkinDistance, Unguarded, Worth};

@@ -5,10 +5,12 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use crate::accurate::{AccurateSize, SolveInfo};
+use crate::accurate::AccurateSize;
 use crate::database::{Database, DatabaseKind};
 use crate::example::{Example, Record, Rejection};
 use crate::setup::Setup;
+use crate::solve_info::SolveInfo;
+use crate::worth::Worth;
 use plica_geometry::ReferenceSkin;
 
 /// Report of a job.
@@ -59,8 +61,21 @@ pub struct Summary {
     pub independent_rms_m: Option<Spread>,
     /// Size of the tie's force over that of the accurate model's own contact, by set; for lifts the suction stands for the contact.
     pub tied_over_independent_force: BTreeMap<String, Spread>,
+    /// Results that needed a guard against elements that turn over.
+    pub guarded: Vec<Guarded>,
     /// Interactions without an example, with the reason.
     pub rejected: Vec<Rejection>,
+}
+
+/// A result that needed a guard.
+#[derive(Debug, Clone, Serialize)]
+pub struct Guarded {
+    /// Number of the interaction in its plan.
+    pub index: u32,
+    /// `tied` or `independent`.
+    pub reference: &'static str,
+    /// What the result without the guard is worth.
+    pub unguarded: Worth,
 }
 
 /// Newton solves of all examples.
@@ -132,6 +147,7 @@ impl TrainingReport {
             detail_max_m: Spread::of(details().map(|d| largest(d))),
             independent_rms_m: Spread::of(own().map(|d| rms(d, &areas))),
             tied_over_independent_force: force_ratios(examples),
+            guarded: records().flat_map(Guarded::of).collect(),
             rejected: database.rejected.clone(),
         };
         let about = &database.about;
@@ -148,6 +164,14 @@ fn force_ratios(examples: &[Example]) -> BTreeMap<String, Spread> {
         }
     }
     ratios.into_iter().filter_map(|(kind, all)| Some((kind, Spread::of(all.into_iter())?))).collect()
+}
+
+impl Guarded {
+    fn of(record: &Record) -> impl Iterator<Item = Self> + use<> {
+        let index = record.index;
+        let both = [("tied", record.tied_unguarded), ("independent", record.independent_unguarded)];
+        both.into_iter().filter_map(move |(reference, worth)| Some(Self { index, reference, unguarded: worth? }))
+    }
 }
 
 impl Solves {

@@ -214,7 +214,7 @@ fn keep<T>(
     match result {
         Ok(value) => Ok(Some(value)),
         Err(Stop::Interrupted) => Err(TrainingError::Interrupted),
-        Err(Stop::Rejected(_, message)) => {
+        Err(Stop::Rejected(_, message, _)) => {
             left_out.push(format!("{index}, {name}: {message}"));
             Ok(None)
         }

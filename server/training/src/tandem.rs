@@ -4,20 +4,22 @@ use nalgebra::Isometry3;
 use plica_accurate::contact::Obstacle;
 use plica_accurate::{Tie, TieTarget};
 
-use crate::accurate::{Accurate, AccurateFailure, AccurateResult, SolveInfo};
+use crate::accurate::{Accurate, AccurateFailure, AccurateResult, Touch};
 use crate::coarse::{Coarse, CoarseResult, Interrupted, SolveObserver};
 use crate::error::BuildError;
 use crate::example::{Example, Outcome, Reason, Record, Rejection, difference, numbers, rows, to_f32};
 use crate::interaction::{Action, Interaction, to_numbers};
 use crate::obstacle::obstacle;
 use crate::setup::Setup;
+use crate::solve_info::{SMALLEST_JACOBIAN, SolveInfo};
 use crate::suction::{Disc, LiftTarget, lift};
 use crate::tie_targets::{around_tool, under_disc};
 use crate::tool_path::ToolPath;
+use crate::worth::{Unguarded, Worth};
 use plica_geometry::{ReferenceSkin, SurfacePoint};
 
-/// A result with an element below this `det F` is not stored.
-pub const SMALLEST_JACOBIAN: f64 = 0.05;
+/// Largest distance of a straightened path from the recorded one, as a share of the mean edge of the accurate mesh.
+const STRAIGHT_CELLS: f64 = 0.05;
 
 /// Both models of a scene, with the memory of one thread.
 pub struct Tandem<'a> {
@@ -58,14 +60,14 @@ pub enum Stop {
     /// Ended by the observer.
     Interrupted,
     /// The interaction is rejected.
-    Rejected(Reason, String),
+    Rejected(Reason, String, Option<Box<Worth>>),
 }
 
 impl std::fmt::Display for Stop {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Interrupted => f.write_str("interrupted"),
-            Self::Rejected(_, message) => f.write_str(message),
+            Self::Rejected(_, message, _) => f.write_str(message),
         }
     }
 }
@@ -122,14 +124,21 @@ impl<'a> Tandem<'a> {
     ) -> Result<Outcome, Interrupted> {
         match self.try_solve(index, interaction, with_independent, observer) {
             Ok(example) if example.is_finite() => Ok(Outcome::Accepted(Box::new(example))),
-            Ok(_) => Ok(self.rejected(index, interaction, Reason::NotFinite, "a number of it is not finite".into())),
-            Err(Stop::Rejected(reason, message)) => Ok(self.rejected(index, interaction, reason, message)),
+            Ok(_) => {
+                let rejected =
+                    self.rejected(index, interaction, Reason::NotFinite, "a number of it is not finite".into());
+                Ok(Outcome::Rejected(rejected))
+            }
+            Err(Stop::Rejected(reason, message, worth)) => {
+                let rejected = self.rejected(index, interaction, reason, message);
+                Ok(Outcome::Rejected(Rejection { worth: worth.map(|worth| *worth), ..rejected }))
+            }
             Err(Stop::Interrupted) => Err(Interrupted),
         }
     }
 
-    fn rejected(&self, index: u32, interaction: &Interaction, reason: Reason, message: String) -> Outcome {
-        Outcome::Rejected(Rejection {
+    fn rejected(&self, index: u32, interaction: &Interaction, reason: Reason, message: String) -> Rejection {
+        Rejection {
             index,
             kind: interaction.kind.clone(),
             reason,
@@ -137,8 +146,9 @@ impl<'a> Tandem<'a> {
             contact_point_m: interaction.contact_point_m,
             depth_m: interaction.depth_m(),
             drag_m: interaction.drag().into(),
+            worth: None,
             interaction_sha256: self.setup.fingerprint(interaction),
-        })
+        }
     }
 
     fn try_solve(
@@ -172,7 +182,9 @@ impl<'a> Tandem<'a> {
                 settling: (&half.state.settling).into(),
                 n_tied: half.targets.len() as u32,
                 tied: tied.solve,
-                independent: independent.map(|r| r.solve),
+                independent: independent.as_ref().map(|r| r.solve),
+                tied_unguarded: self.worth(&tied),
+                independent_unguarded: independent.as_ref().and_then(|r| self.worth(r)),
                 interaction_sha256: self.setup.fingerprint(interaction),
             },
         })
@@ -195,19 +207,20 @@ impl<'a> Tandem<'a> {
             return Err(Stop::Rejected(
                 Reason::CoarseUnstable,
                 format!("{} states were rolled back", settling.rollbacks),
+                None,
             ));
         }
         if !settling.settled {
             let (um, time_s) = (1e6 * settling.motion_m, settling.time_s);
             let message = format!("a node still moves by {um:.1} um per window after {time_s:.1} s");
-            return Err(Stop::Rejected(Reason::NotSettled, message));
+            return Err(Stop::Rejected(Reason::NotSettled, message, None));
         }
         Ok(half)
     }
 
     fn press_coarse(&mut self, interaction: &Interaction, observer: SolveObserver<'_>) -> Result<CoarseHalf, Stop> {
         let (tool, setup) = (interaction.tool as usize, self.setup);
-        let nothing = || Stop::Rejected(Reason::NothingTouched, "the tool passes the object by".into());
+        let nothing = || Stop::Rejected(Reason::NothingTouched, "the tool passes the object by".into(), None);
         let path = ToolPath::of(interaction, &self.obstacles[tool], &self.skin).ok_or_else(nothing)?;
         let state = self.coarse.press(tool, &path, &setup.drive, observer)?;
         self.under_tool(tool, path, state).ok_or_else(nothing)
@@ -252,7 +265,7 @@ impl<'a> Tandem<'a> {
         let lifted = lift(&mut self.coarse, &self.skin, target, &self.setup.drive, observer)?;
         if !lifted.reached {
             let message = format!("{:.2} mm of {:.2} mm", 1e3 * lifted.height_m, 1e3 * height_m);
-            return Err(Stop::Rejected(Reason::HeightNotReached, message));
+            return Err(Stop::Rejected(Reason::HeightNotReached, message, None));
         }
         let mut state = lifted.state;
         state.tool_force = -lifted.skin_forces.iter().sum::<nalgebra::Vector3<f64>>();
@@ -271,7 +284,7 @@ impl<'a> Tandem<'a> {
     pub fn solve_tied(&mut self, half: &CoarseHalf, observer: SolveObserver<'_>) -> Result<AccurateResult, Stop> {
         let tie = Tie::new(self.accurate.embedding(), &half.targets, &self.setup.tie);
         let result = self.accurate.tied(&tie, observer);
-        accept(result, Reason::TiedNotConverged, Reason::TiedInverted)
+        self.accept(result, Reason::TiedNotConverged, Reason::TiedInverted)
     }
 
     /// The accurate model under the tool itself, or under the same suction: only the pressure of the suction is taken from the
@@ -289,24 +302,40 @@ impl<'a> Tandem<'a> {
         let friction = self.setup.coarse.tools[tool].friction;
         let result = match &half.load {
             Load::Suction(forces) => self.accurate.loaded(forces, observer),
-            Load::Tool(path) => self.accurate.pressed(&self.obstacles[tool], friction, path, observer),
+            Load::Tool(path) => {
+                // A recorded path has a pose every fraction of a millimetre, at which nothing need be solved.
+                let passes = matches!(interaction.action, Action::Follow { .. });
+                let straight = passes.then(|| path.straightened(STRAIGHT_CELLS * self.accurate.cell_m()));
+                let path = straight.as_ref().unwrap_or(path);
+                self.accurate.pressed(Touch { obstacle: &self.obstacles[tool], friction, path, passes }, observer)
+            }
         };
-        accept(result, Reason::IndependentNotConverged, Reason::IndependentInverted)
+        self.accept(result, Reason::IndependentNotConverged, Reason::IndependentInverted)
     }
-}
 
-fn accept(
-    result: Result<AccurateResult, AccurateFailure>,
-    not_converged: Reason,
-    inverted: Reason,
-) -> Result<AccurateResult, Stop> {
-    match result {
-        Ok(result) if result.solve.smallest_jacobian >= SMALLEST_JACOBIAN => Ok(result),
-        Ok(AccurateResult { solve: SolveInfo { smallest_jacobian, iterations, .. }, .. }) => Err(Stop::Rejected(
-            inverted,
-            format!("smallest J is {smallest_jacobian:.3}, below {SMALLEST_JACOBIAN}, after {iterations} Newton steps"),
-        )),
-        Err(AccurateFailure::Failed(message)) => Err(Stop::Rejected(not_converged, message)),
-        Err(AccurateFailure::Interrupted) => Err(Stop::Interrupted),
+    /// Worth of the result without a guard beside the one with it, where that was needed.
+    fn worth(&self, result: &AccurateResult) -> Option<Worth> {
+        let unguarded = result.unguarded.as_ref()?;
+        Some(unguarded.worth(self.skin.vertex_areas()))
+    }
+
+    fn accept(
+        &self,
+        result: Result<AccurateResult, AccurateFailure>,
+        not_converged: Reason,
+        inverted: Reason,
+    ) -> Result<AccurateResult, Stop> {
+        let worth = |unguarded: &Unguarded| Some(Box::new(unguarded.worth(self.skin.vertex_areas())));
+        match result {
+            Ok(result) if !result.solve.is_turned_over() => Ok(result),
+            Ok(AccurateResult { solve: SolveInfo { smallest_jacobian, iterations, .. }, unguarded, .. }) => {
+                let message = format!(
+                    "smallest J is {smallest_jacobian:.3}, below {SMALLEST_JACOBIAN}, after {iterations} Newton steps"
+                );
+                Err(Stop::Rejected(inverted, message, unguarded.as_deref().and_then(worth)))
+            }
+            Err(AccurateFailure::Failed(message, last)) => Err(Stop::Rejected(not_converged, message, worth(&last))),
+            Err(AccurateFailure::Interrupted) => Err(Stop::Interrupted),
+        }
     }
 }

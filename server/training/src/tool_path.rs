@@ -59,6 +59,30 @@ impl ToolPath {
         }
     }
 
+    /// Without the poses that straight lines between the others pass within `tolerance_m` \[m\] \[DP73\].
+    pub fn straightened(&self, tolerance_m: f64) -> Self {
+        let mut kept = vec![false; self.poses.len()];
+        let mut spans = vec![[0, self.poses.len() - 1]];
+        while let Some([first, last]) = spans.pop() {
+            (kept[first], kept[last]) = (true, true);
+            let misses = (first + 1..last).map(|k| (self.miss(first, last, k), k));
+            if let Some((_, farthest)) = misses.filter(|m| m.0 > tolerance_m).max_by(|a, b| a.0.total_cmp(&b.0)) {
+                spans.extend([[first, farthest], [farthest, last]]);
+            }
+        }
+        Self::new(self.poses.iter().zip(kept).filter(|(_, kept)| *kept).map(|(pose, _)| *pose).collect())
+    }
+
+    /// Distance of pose `k` from the straight line between two others, passed at the same share of the path \[m\].
+    fn miss(&self, first: usize, last: usize, k: usize) -> f64 {
+        let length = self.reached[last] - self.reached[first];
+        let share = if length > 0.0 { (self.reached[k] - self.reached[first]) / length } else { 0.0 };
+        let (a, b, pose) = (&self.poses[first], &self.poses[last], &self.poses[k]);
+        let passed = a.try_lerp_slerp(b, share, 1e-12).unwrap_or(*b);
+        let turn = LEVER_M * passed.rotation.angle_to(&pose.rotation);
+        (passed.translation.vector - pose.translation.vector).norm().max(turn)
+    }
+
     /// Poses between the straight lines.
     pub fn poses(&self) -> &[Isometry3<f64>] {
         &self.poses
@@ -121,6 +145,14 @@ mod tests {
         let steps = path.steps(2.0);
         assert_eq!(steps.len(), 4);
         assert!(steps.contains(&at(0.0, 0.0)) && steps.contains(&at(0.0, 1.5)));
+    }
+
+    #[test]
+    fn a_straightened_path_keeps_its_corners_and_ends_only() {
+        let at = |x: f64, z: f64| Isometry3::translation(x, 0.0, z);
+        let path = ToolPath::new(vec![at(0.0, 2.0), at(0.05, 1.0), at(0.0, 0.0), at(1.0, 0.02), at(2.0, 0.0)]);
+        assert_eq!(path.straightened(0.1).poses(), [at(0.0, 2.0), at(0.0, 0.0), at(2.0, 0.0)]);
+        assert_eq!(path.straightened(0.01).poses(), path.poses());
     }
 
     #[test]

@@ -34,6 +34,8 @@ fn example(index: u32, two_references: bool) -> Example {
             n_tied: 30,
             tied: solve,
             independent: two_references.then_some(solve),
+            tied_unguarded: None,
+            independent_unguarded: None,
             interaction_sha256: "b".repeat(64),
         },
     }
@@ -51,6 +53,7 @@ fn database(two_references: bool) -> Database {
             contact_point_m: [0.0; 3],
             depth_m: 0.01,
             drag_m: [0.0; 3],
+            worth: None,
             interaction_sha256: "c".repeat(64),
         }],
     }

@@ -59,6 +59,10 @@ impl NegativeModes {
         found
     }
 
+    pub(super) fn is_empty(&self) -> bool {
+        self.n == 0
+    }
+
     /// The block of gradients `a` and `b` that lifts the negative eigenvalues to 0.
     pub(super) fn lift(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> Matrix3<f64> {
         let modes = self.modes[..self.n].iter();

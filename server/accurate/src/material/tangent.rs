@@ -43,10 +43,34 @@ impl Tangent {
             negative: NegativeModes::default(),
             fibres: law.fibres.map(|fibres| fibres.tangent(deformation, projection)),
         };
-        if projection == Projection::PositiveSemidefinite {
-            tangent.negative = NegativeModes::new(&tangent.f, &tangent.factors);
-        }
+        tangent.project(projection);
         tangent
+    }
+
+    /// Of an energy density `w(J)`, given `w'` and `w''`.
+    pub(crate) fn of_volume(deformation: &Deformation, slope: f64, curvature: f64, projection: Projection) -> Self {
+        let mut tangent = Self {
+            f: deformation.f(),
+            cofactor: deformation.cofactor(),
+            factors: Factors {
+                identity: 0.0,
+                along_f: 0.0,
+                along_both: 0.0,
+                along_cofactor: curvature,
+                curvature: slope,
+            },
+            transposition: 0.0,
+            negative: NegativeModes::default(),
+            fibres: None,
+        };
+        tangent.project(projection);
+        tangent
+    }
+
+    fn project(&mut self, projection: Projection) {
+        if projection == Projection::PositiveSemidefinite {
+            self.negative = NegativeModes::new(&self.f, &self.factors);
+        }
     }
 
     /// `2 mu sym + lambda I (x) I`, `lambda` of the local part: positive semi-definite, and the trace is linear in `F`.
@@ -63,22 +87,33 @@ impl Tangent {
 
     /// `B` with `u^T B v = H[u a^T, v b^T]`.
     pub(crate) fn block(&self, a: &Vector3<f64>, b: &Vector3<f64>) -> Matrix3<f64> {
-        let (f, c) = (&self.f, &self.cofactor);
-        let factors = &self.factors;
-        let w = f * a.cross(b) * factors.curvature;
+        self.block_of(&self.image(a), &self.image(b))
+    }
+
+    fn image(&self, gradient: &Vector3<f64>) -> Image {
+        Image { gradient: *gradient, by_f: self.f * gradient, by_cofactor: self.cofactor * gradient }
+    }
+
+    fn block_of(&self, a: &Image, b: &Image) -> Matrix3<f64> {
+        let w = self.f * a.gradient.cross(&b.gradient) * self.factors.curvature;
         // u . (v x w) = -u^T [w]_x v.
         let bend = Matrix3::new(0.0, w.z, -w.y, -w.z, 0.0, w.x, w.y, -w.x, 0.0);
-        let mut block = Matrix3::from_diagonal_element(factors.identity * a.dot(b))
-            + f * a * (f * b).transpose() * factors.along_f
-            + c * a * (c * b).transpose() * factors.along_cofactor
-            + bend
-            + b * a.transpose() * self.transposition
-            + self.negative.lift(a, b);
-        if factors.along_both != 0.0 {
-            block += (f * a * (c * b).transpose() + c * a * (f * b).transpose()) * factors.along_both;
+        let mut block = Matrix3::from_diagonal_element(self.factors.identity * a.gradient.dot(&b.gradient))
+            + a.by_f * b.by_f.transpose() * self.factors.along_f
+            + a.by_cofactor * b.by_cofactor.transpose() * self.factors.along_cofactor
+            + bend;
+        if self.transposition != 0.0 {
+            block += b.gradient * a.gradient.transpose() * self.transposition;
+        }
+        if !self.negative.is_empty() {
+            block += self.negative.lift(&a.gradient, &b.gradient);
+        }
+        if self.factors.along_both != 0.0 {
+            let mixed = a.by_f * b.by_cofactor.transpose() + a.by_cofactor * b.by_f.transpose();
+            block += mixed * self.factors.along_both;
         }
         if let Some(fibres) = &self.fibres {
-            block += fibres.block(a, b);
+            block += fibres.block(&a.gradient, &b.gradient);
         }
         block
     }
@@ -90,10 +125,18 @@ impl Tangent {
         weight: f64,
         blocks: &mut [[Matrix3<f64>; N]; N],
     ) {
+        let images = gradients.map(|gradient| self.image(&gradient));
         for a in 0..N {
             for b in 0..=a {
-                blocks[a][b] += self.block(&gradients[a], &gradients[b]) * weight;
+                blocks[a][b] += self.block_of(&images[a], &images[b]) * weight;
             }
         }
     }
+}
+
+/// A gradient with its products, which every block of it shares.
+struct Image {
+    gradient: Vector3<f64>,
+    by_f: Vector3<f64>,
+    by_cofactor: Vector3<f64>,
 }

@@ -91,3 +91,13 @@ pub enum SolveError {
     #[error(transparent)]
     Factor(#[from] FactorError),
 }
+
+impl SolveError {
+    /// Residual left, where it is known.
+    pub fn residual(&self) -> Option<f64> {
+        match self {
+            Self::NotConverged { residual, .. } | Self::LineSearch { residual, .. } => Some(*residual),
+            _ => None,
+        }
+    }
+}

@@ -13,9 +13,9 @@ const LEAST_JACOBIAN: f64 = 1e-3;
 
 /// Gradients `dN_a/dX` \[1/m\] and weight \[m^3\] of a Gauss point.
 #[derive(Debug, Clone)]
-struct GaussPoint<const N: usize> {
-    gradients: [Vector3<f64>; N],
-    weight: f64,
+pub(super) struct GaussPoint<const N: usize> {
+    pub(super) gradients: [Vector3<f64>; N],
+    pub(super) weight: f64,
 }
 
 /// Reference element of `N` nodes with `Q` Gauss points.
@@ -101,6 +101,16 @@ impl<const N: usize, const Q: usize> Element<N, Q> {
     /// Position at rest \[m\] of reference coordinates.
     pub(super) fn rest_at(&self, xi: [f64; 3]) -> Vector3<f64> {
         self.rest.iter().zip((self.reference.shapes)(xi)).map(|(x, n)| x * n).sum()
+    }
+
+    /// Gauss points with their deformation.
+    pub(super) fn points_at(&self, x: &[Vector3<f64>]) -> impl Iterator<Item = (&GaussPoint<N>, Deformation)> {
+        let u = self.displacements(x);
+        self.points.iter().map(move |point| (point, deformation(&u, &point.gradients)))
+    }
+
+    pub(super) fn shear_modulus(&self) -> f64 {
+        self.law.mu
     }
 
     pub(super) fn value(&self, x: &[Vector3<f64>]) -> f64 {

@@ -31,7 +31,7 @@ pub(super) fn write_comparison(
     );
     let version = |name, positions, note| Version { name, note, positions };
     let hexes = |divisions: [usize; 3]| divisions.iter().product::<usize>();
-    let reference = format!("{} hexahedra, quasi-static", hexes(config.object().accurate().divisions));
+    let reference = format!("{} hexahedra, quasi-static", hexes(config.object().accurate().mesh.divisions));
     let contrast = Contrast {
         title: &title,
         subtitle: &subtitle,

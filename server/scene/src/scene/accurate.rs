@@ -11,11 +11,20 @@ const MAX_HEXES: u64 = 1_000_000;
 /// Default number of hexahedra of the accurate model per coarse hexahedron and axis.
 const REFINEMENT: usize = 3;
 
+/// Mesh of the accurate model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AccurateMesh {
+    /// Hexahedra along x, y, z.
+    pub divisions: [usize; 3],
+    /// Length of the last over that of the first, along each.
+    pub grading: [f64; 3],
+}
+
 /// Quasi-static model of the examples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AccurateConfig {
-    /// Hexahedra along x, y, z.
-    pub divisions: [usize; 3],
+    /// Its mesh.
+    pub mesh: AccurateMesh,
     /// Material outside of all regions.
     pub material: Material,
 }
@@ -39,7 +48,7 @@ pub(super) fn check(
         ));
     }
     Ok(AccurateConfig {
-        divisions,
+        mesh: AccurateMesh { divisions, grading: raw.grading.unwrap_or([1.0; 3]) },
         material: Material {
             model: match raw.model {
                 RawMaterialModel::StableNeoHookean => MaterialModel::StableNeoHookean,

@@ -1,6 +1,7 @@
 //! `plicad train --sensitivity`: sensitivity of the accurate skin to mesh, tie and reference.
 
 use plica_scene::Config;
+use plica_scene::scene::AccurateMesh;
 use plica_scene::{model, setup};
 use plica_training::{Difference, Sensitivity, Variations, sensitivity};
 
@@ -14,12 +15,12 @@ const TIE_FACTORS: [f64; 4] = [0.1, 1.0, 10.0, 100.0];
 pub(super) fn run(config: &Config, n_interactions: usize, n_threads: usize, json: bool) -> anyhow::Result<()> {
     let ending = Ending::listen()?;
     let setup = setup::setup(config)?;
-    let own = config.object().accurate().divisions;
+    let AccurateMesh { divisions: own, grading } = config.object().accurate().mesh;
     let mut meshes = Vec::new();
     for factor in REFINEMENTS {
         let divisions = own.map(|n| ((factor * n as f64).round() as usize).max(1));
         let name = divisions.map(|n| n.to_string()).join("x");
-        meshes.push((name, model::describe_accurate(config, Some(divisions))?));
+        meshes.push((name, model::describe_accurate(config, Some(AccurateMesh { divisions, grading }))?));
     }
     let variations =
         Variations { n_interactions, meshes, tie_factors: TIE_FACTORS.to_vec(), independent_on_all_meshes: true };

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use plica_training::{Solves, Spread, TrainingReport};
+use plica_training::{Solves, Spread, TrainingReport, Worth};
 
 pub(super) fn print(report: &TrainingReport, database: &Path, file: &Path) {
     let (result, run) = (&report.result, &report.run);
@@ -12,6 +12,25 @@ pub(super) fn print(report: &TrainingReport, database: &Path, file: &Path) {
     for rejected in &result.rejected {
         let place = rejected.contact_point_m.map(|x| format!("{:.1}", 1e3 * x)).join(", ");
         println!("rejected      {} ({}) at ({place}) mm: {}", rejected.index, rejected.kind, rejected.message);
+        if let Some(w) = &rejected.worth {
+            println!(
+                "              residual {:.1e}, smallest J {:.3} {}",
+                w.residual,
+                w.smallest_jacobian,
+                place_of(w)
+            );
+        }
+    }
+    for guarded in &result.guarded {
+        let w = &guarded.unguarded;
+        let away = w.to_accepted.map(|d| format!("; skin {:.4} mm RMS away", 1e3 * d.rms_m)).unwrap_or_default();
+        println!(
+            "guarded       {} {}: without, smallest J {:.3} {}{away}",
+            guarded.index,
+            guarded.reference,
+            w.smallest_jacobian,
+            place_of(w)
+        );
     }
     println!(
         "accurate      {} hexahedra, {} unknowns, {:.1} million values in the factor",
@@ -37,6 +56,10 @@ pub(super) fn print(report: &TrainingReport, database: &Path, file: &Path) {
         run.resumed
     );
     println!("report        {}", file.display());
+}
+
+fn place_of(worth: &Worth) -> String {
+    format!("at ({}) mm", worth.worst_m.map(|x| format!("{:.1}", 1e3 * x)).join(", "))
 }
 
 fn solves(name: &str, solves: &Option<Solves>) {

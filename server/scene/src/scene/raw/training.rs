@@ -18,6 +18,9 @@ pub struct RawAccurate {
     /// Hexahedra along x, y, z; three times the coarse ones where left out.
     #[schemars(inner(range(min = 1, max = 1000)))]
     pub divisions: Option<[u32; 3]>,
+    /// Length of the last hexahedron over that of the first, along x, y, z; 1 where left out.
+    #[schemars(inner(range(min = 1e-3, max = 1e3)))]
+    pub grading: Option<[f64; 3]>,
     /// Material law.
     pub model: RawMaterialModel,
     /// Young's modulus in place of the object's [Pa].
