@@ -131,7 +131,7 @@ impl Factor {
         out.fill(Vector3::zeros());
         for (block, values) in self.solution.chunks_exact(3).enumerate() {
             let node = hessian.node_of_block(block);
-            out[node] = hessian.from_axes(node, &Vector3::new(values[0], values[1], values[2]));
+            out[node] = hessian.combine_axes(node, &Vector3::new(values[0], values[1], values[2]));
         }
     }
 }

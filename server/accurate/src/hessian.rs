@@ -96,7 +96,7 @@ impl Hessian {
                 }
             }
         }
-        product.iter().enumerate().map(|(node, v)| self.from_axes(node, v)).collect()
+        product.iter().enumerate().map(|(node, v)| self.combine_axes(node, v)).collect()
     }
 
     /// Adds the second derivatives of one stencil: `block(a, b)` couples `nodes[a]` and `nodes[b]` and is called once
@@ -140,7 +140,7 @@ impl Hessian {
     }
 
     /// The vector with the given components along the axes of a node's frame.
-    pub(crate) fn from_axes(&self, node: usize, v: &Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn combine_axes(&self, node: usize, v: &Vector3<f64>) -> Vector3<f64> {
         self.frame(node).map_or(*v, |frame| frame * v)
     }
 
