@@ -46,7 +46,7 @@ enum Condition<'a> {
 
 impl Solver {
     /// Moves `state` to the next equilibrium, `step_m` \[m\] away along the path as measured by the farthest node: the tangent
-    /// of the path, then Newton's method in its normal plane \[Riks79; Wem71\]. The matrix need not be positive definite. The
+    /// of the path, then Newton's method in its normal plane \[Riks79\], \[Wem71\]. The matrix need not be positive definite. The
     /// first step raises the share, every further one goes on in the direction of the last.
     ///
     /// # Errors
