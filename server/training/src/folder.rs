@@ -126,11 +126,12 @@ impl TrainingFolder {
         let path = self.paths.job();
         let asks = |j: &TrainingJob| (j.kind, j.examples, j.seed);
         if let Some(found) = read_json::<TrainingJob>(&path)?.filter(|found| asks(found) != asks(job)) {
+            let or_scene = |n: Option<String>| n.unwrap_or_else(|| "the scene's number of".into());
             let problem = format!(
-                "the folder holds another job ({} {:?} with seed {:?}); choose another folder, or remove this one",
+                "the folder holds another job ({}, {} examples, {}); choose another folder, or remove this one",
                 found.kind.name(),
-                found.examples,
-                found.seed
+                or_scene(found.examples.map(|n| n.to_string())),
+                found.seed.map_or_else(|| "the scene's seed".to_owned(), |seed| format!("seed {seed}"))
             );
             return Err(TrainingError::File { path, problem });
         }

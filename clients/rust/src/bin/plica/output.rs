@@ -1,5 +1,6 @@
 //! What a person and what a program reads.
 
+use std::io::Write;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -20,11 +21,9 @@ pub(crate) struct Output {
 impl Output {
     /// The end of a command.
     pub(crate) fn result(self, value: &Value, text: &str) {
-        if self.json {
-            println!("{value}");
-        } else {
-            println!("{text}");
-        }
+        let mut out = std::io::stdout();
+        // A reader that has seen enough, like `head`, is no fault.
+        let _ = if self.json { writeln!(out, "{value}") } else { writeln!(out, "{text}") };
     }
 
     /// The end of a command that failed; with the code, if the daemon refused.
