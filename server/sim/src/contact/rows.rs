@@ -169,7 +169,9 @@ impl Rows {
             let is_same = |o: &Contact| o.body == selection.body && o.feature == c.feature;
             let old = selection.old.iter().position(is_same);
             let load = old.map_or(0.0, |o| selection.old[o].normal_force);
-            if c.is_fringe && load <= 0.0 {
+            // One that friction drags along is left to the neighbour that it comes to.
+            let is_dragged = selection.friction > 0.0 && old.is_some_and(|o| selection.old[o].slides());
+            if c.is_fringe && (load <= 0.0 || is_dragged) {
                 continue;
             }
             let old = old.map(|o| o as u32);
