@@ -9,9 +9,9 @@ mod common;
 use std::sync::Arc;
 
 use common::examples::{RADIUS, examples, presses};
-use common::{E, Run, Scene, ball, tool, top, top_normal};
+use common::{E, Run, Scene, ball, golden_spiral, tool, top, top_normal};
 use divan::Bencher;
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 use plica_geometry::ConvexPolytope;
 use plica_sim::enrichment::{DEFAULT_METHOD, Enricher, EnrichmentOptions, LiveEnrichment};
 use plica_sim::{ToolShape, kernels};
@@ -45,14 +45,10 @@ fn contact(bencher: Bencher, hull_points: usize) {
     bencher.bench_local(|| kernels::find_contacts(&model, &state, &mut workspace));
 }
 
-/// Points on the ball by the golden angle.
+/// Hull of `n` points on the ball.
 fn hull_of_a_ball(n: usize) -> ToolShape {
-    let point = |i: usize| {
-        let z = 1.0 - (2 * i + 1) as f64 / n as f64;
-        let (sin, cos) = (2.399_963_229_728_653 * i as f64).sin_cos();
-        Point3::from(Vector3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z) * RADIUS)
-    };
-    ToolShape::ConvexHull { polytope: ConvexPolytope::hull((0..n).map(point).collect()).unwrap() }
+    let points = golden_spiral(n).map(|p| Point3::from(p * RADIUS)).collect();
+    ToolShape::ConvexHull { polytope: ConvexPolytope::hull(points).unwrap() }
 }
 
 #[divan::bench]

@@ -117,15 +117,6 @@ fn flat_faces_and_edges_settle_on_the_triangles() {
     }
 }
 
-/// Points of the golden spiral on the unit sphere.
-fn golden_spiral(n: usize) -> impl Iterator<Item = Vector3<f64>> {
-    (0..n).map(move |i| {
-        let z = 1.0 - (2 * i + 1) as f64 / n as f64;
-        let (sin, cos) = (2.399_963_229_728_653 * i as f64).sin_cos();
-        Vector3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
-    })
-}
-
 #[test]
 fn a_hull_of_thousands_of_points_presses_as_the_ball_that_it_approximates() {
     let (radius, depth) = (0.010, 0.005);

@@ -57,8 +57,9 @@ impl Plane {
 }
 
 /// The plane among `numbers`, in ascending order, with the largest signed distance to `p`; the first of equal ones.
+/// To a point that is not finite, plane 0 at a distance of minus infinity.
 pub(super) fn nearest_of(planes: &[Plane], numbers: impl Iterator<Item = u32>, p: &V3) -> Nearest {
-    let mut best = Nearest { distance: f32::NEG_INFINITY, plane: u32::MAX };
+    let mut best = Nearest { distance: f32::NEG_INFINITY, plane: 0 };
     for plane in numbers {
         let distance = planes[plane as usize].distance(p);
         if distance > best.distance {

@@ -232,7 +232,7 @@ impl Polytope {
     /// Signed distance and outward normal of the nearest face; mitred outside edges, exact on and inside the surface.
     pub(crate) fn distance(&self, p: &V3) -> (f32, V3) {
         let nearest = self.nearest_plane(p);
-        (nearest.distance, self.planes.get(nearest.plane as usize).map_or(V3::z(), |plane| plane.normal))
+        (nearest.distance, self.planes[nearest.plane as usize].normal)
     }
 
     /// Largest signed distance to a plane, and which; the first of equal ones.
@@ -415,6 +415,13 @@ mod tests {
             assert!(bound == exact || bound > 2e-3 && bound <= exact + 1e-7, "{bound} of {exact}");
         }
         let bounds = |part: &Polytope| Solid::Polytopes(vec![part.clone()]).bounds(&placement);
+        // A state that is not finite is for the gates to judge, not for the search to stumble over.
+        let lost =
+            Segment { ends: [V3::repeat(f32::NAN), V3::zeros()], planes: [UNKNOWN_PLANE; 2], reach: f32::INFINITY };
+        for part in [&many, &all] {
+            let _ = part.distance_to_segment(&lost);
+            assert!(!part.distance(&lost.ends[0]).0.is_finite());
+        }
         for (found, expected) in bounds(&many).iter().zip(bounds(&all)) {
             assert!((found - expected).norm() < 1e-7);
         }

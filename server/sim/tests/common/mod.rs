@@ -325,3 +325,12 @@ pub fn distorted_block(size_m: [f64; 3], divisions: [usize; 3], share: f64) -> H
     };
     HexMesh::new(mesh.nodes().iter().map(moved).collect(), mesh.hexes().to_vec()).unwrap()
 }
+
+/// Points of the golden spiral on the unit sphere.
+pub fn golden_spiral(n: usize) -> impl Iterator<Item = Vector3<f64>> {
+    (0..n).map(move |i| {
+        let z = 1.0 - (2 * i + 1) as f64 / n as f64;
+        let (sin, cos) = (2.399_963_229_728_653 * i as f64).sin_cos();
+        Vector3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z)
+    })
+}
