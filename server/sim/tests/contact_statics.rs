@@ -172,6 +172,30 @@ fn a_rounded_block_of_many_vertices_rests_flat_on_its_side() {
 }
 
 #[test]
+fn a_rounded_block_smaller_than_a_triangle_rests_quietly() {
+    let half = [0.25e-3, 0.25e-3, 0.25e-3];
+    let corner = |p: &Vector3<f64>| Vector3::from_fn(|k, _| p[k] * 0.05e-3 + p[k].signum() * half[k]);
+    let polytope = ConvexPolytope::hull(golden_spiral(400).map(|p| Point3::from(corner(&p))).collect()).unwrap();
+    let mut run = Scene::wedge(E, 0.45).tool(tool("t", ToolShape::ConvexHull { polytope })).run();
+    let d = run.model.description();
+    let is_on_top = |p: &Point3<f64>| (p.z - top(p.x)).abs() < 1e-9 && (p - Point3::new(0.05, 0.03, p.z)).norm() < 3e-3;
+    let between = d.skin.triangles().iter().map(|t| t.map(|v| d.skin.positions()[v.index()]));
+    let [a, b, c] = between.into_iter().find(|t| t.iter().all(is_on_top)).unwrap();
+    let depth = 2e-3;
+    let origin = Point3::from((a.coords + b.coords + c.coords) / 3.0) + top_normal() * (0.3e-3 - depth);
+    let pose = Isometry3::from_parts(origin.into(), facing_top(0.0));
+    press_and_hold(&mut run, pose, depth, 2.0);
+    let before = run.force();
+    let mut largest_change: f64 = 0.0;
+    for _ in 0..200 {
+        run.tick(&[(0, pose)]);
+        largest_change = largest_change.max((run.force() - before).norm() / before.norm());
+    }
+    println!("small rounded block: force {:.3} N, changes by {largest_change:.1e}", before.norm());
+    assert!(before.norm() > 0.1 && largest_change < 2e-3);
+}
+
+#[test]
 fn a_block_rests_on_a_plane() {
     for e in [3e3, 3e4] {
         let mut run = Scene::block(e, 0.45)

@@ -10,9 +10,6 @@ use crate::description::ToolShape;
 /// Up to this number of planes or vertices a loop over all of them is cheapest.
 const FEW: usize = 32;
 
-/// Slope by which a triangle is tilted to find further vertices that press on it.
-const TILT: f32 = 0.1;
-
 /// A shape in its own frame.
 #[derive(Debug, Clone)]
 pub(crate) enum Solid {
@@ -253,9 +250,8 @@ impl Polytope {
     }
 
     /// Calls `visit` with the vertices, in the frame of the world, that may press on the triangle `corners`. Of few vertices these
-    /// are all. Of many, the one that lies deepest below the triangle and those that lie deepest once it is tilted towards each of its
-    /// corners: the distance is convex, so over the inside of the triangle it is smallest under the first, and the others
-    /// keep a flat side from rocking on one point.
+    /// are all; of many, the one that lies deepest below the triangle: the distance is convex, so over the triangle it is smallest there
+    /// or on the edges.
     pub(crate) fn vertices_facing(
         &self,
         placement: &Placement,
@@ -269,18 +265,7 @@ impl Polytope {
         let Some(graph) = &self.vertex_graph else { return (0..self.vertices.len() as u32).for_each(tell) };
         let local = corners.map(|corner| placement.to_local(corner));
         let Some(normal) = triangle_normal(&local[0], &local[1], &local[2]) else { return };
-        let deepest = graph.farthest(&self.vertices, &-normal);
-        tell(deepest);
-        let middle = (local[0] + local[1] + local[2]) / 3.0;
-        let mut told = [deepest; 4];
-        for (k, corner) in local.iter().enumerate() {
-            let Some(towards) = (corner - middle).try_normalize(0.0) else { return };
-            let found = graph.farthest_from(&self.vertices, &(towards * TILT - normal), deepest);
-            if !told[..=k].contains(&found) {
-                tell(found);
-            }
-            told[k + 1] = found;
-        }
+        tell(graph.farthest(&self.vertices, &-normal));
     }
 
     /// Smallest signed distance inside the segment `p q`, where it lies strictly between the ends: parameter, distance and

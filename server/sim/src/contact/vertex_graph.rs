@@ -33,20 +33,14 @@ impl VertexGraph {
     /// The vertex with the largest `d . v`, but for rounding.
     pub(super) fn farthest(&self, vertices: &[V3], d: &V3) -> u32 {
         let value = |v: &u32| d.dot(&vertices[*v as usize]);
-        let start = self.starts.iter().copied().max_by(|a, b| value(a).total_cmp(&value(b))).unwrap_or(0);
-        self.farthest_from(vertices, d, start)
-    }
-
-    /// [`Self::farthest`], begun at a vertex that is likely near.
-    pub(super) fn farthest_from(&self, vertices: &[V3], d: &V3, start: u32) -> u32 {
-        let (mut best, mut at) = (d.dot(&vertices[start as usize]), start);
+        let mut at = self.starts.iter().copied().max_by(|a, b| value(a).total_cmp(&value(b))).unwrap_or(0);
+        let mut best = value(&at);
         loop {
             let around = self.first[at as usize] as usize..self.first[at as usize + 1] as usize;
             let before = at;
             for &next in &self.neighbours[around] {
-                let value = d.dot(&vertices[next as usize]);
-                if value > best {
-                    (best, at) = (value, next);
+                if value(&next) > best {
+                    (best, at) = (value(&next), next);
                 }
             }
             if at == before {
